@@ -94,7 +94,7 @@ class Headset {
     draw(view, { eye, dolly, part, size }, pointed) {
         const { page: { renderer, field, optics: { aperture } }, nearest } = this, { gl } = renderer;
         renderer.begin({ eye, focus: this.focus, aperture }, part, ...this.px);
-        const { lens, target } = renderer.picture, [down, across] = NUMBERS.SQRT_STEPS;
+        const { lens } = renderer.picture, [down, across] = NUMBERS.SQRT_STEPS;
         const cameras = aperture > 0 ? samplesOf(lens, { ...field, hasDisparity: true }, 0)
             : CORNERS.map((corner) => ({ t: 0, s: 0, view: { t: 0, s: 0 }, weight: 1, answer: [...corner, 1] }));
         renderer.pass(cameras.map((one, i) => ({ answer: [fraction(i, across), fraction(i, down), 0], ...one })), ["DOLLY"],
@@ -105,7 +105,7 @@ class Headset {
             .flatMap((place) => times(projectionMatrix, times(inverse.matrix, place)));
         const { x, y, width, height } = layer.getViewport(view), { framebuffer } = layer;
         renderer.draw("window.frag", [], { framebuffer, x, y, width, height },
-            { "corners[0]": corners, size, pointed }, { light_sum: [gl.TEXTURE_2D, target.texture] });
+            { "corners[0]": corners, size, pointed }, { light_sum: [gl.TEXTURE_2D, renderer.target.texture] });
     }
 
     // Returns the space of a window that stands upright before the head: x right, y up, z towards the head.

@@ -90,11 +90,6 @@ function cornersOf({ t, s }, { rows, columns, step }) {
         { t: row, s: column, weight: wt * ws })));
 }
 
-// Returns up to four views around the eye, the heaviest first.
-export function pinholeSources(eye, field) {
-    return cornersOf(eye, field).sort((a, b) => b.weight - a.weight);
-}
-
 // Returns cameras at points of the lens. A sequence chooses the corner of its cell that answers each camera.
 export function answeredSamples(points, first, eye, { rows, columns, step }) {
     const chosen = (two, number) => (number < two.at(-1)[1] ? two.at(-1) : two[0])[0];
@@ -157,7 +152,8 @@ export function cellOf(lens, passIndex) {
 export function samplesOf(lens, field, passIndex) {
     const { eye, diameter, widest, camerasPerPass: count } = lens;
     if (diameter === 0) {
-        const sources = pinholeSources(eye, field).slice(0, lens.level.sources), total = sumOf(sources);
+        const heaviest = cornersOf(eye, field).sort((a, b) => b.weight - a.weight);
+        const sources = heaviest.slice(0, lens.level.sources), total = sumOf(sources);
         return sources.map((view) => ({ t: 0, s: 0, view, weight: view.weight / total }));
     }
     if (!field.hasDisparity) {
@@ -207,18 +203,15 @@ class Program {
             const place = gl.getUniformLocation(this.program, declared);
             if (place) this.uniforms.set(declared, (value) => gl[put](place, [value].flat()));
         }
-        const block = gl.getUniformBlockIndex(this.program, "Samples");
-        if (block !== gl.INVALID_INDEX) gl.uniformBlockBinding(this.program, block, 0);
     }
 
     // Binds the program. textures: by the names of their samplers. Names that the compiler left out are skipped.
     use(values, textures) {
         const { gl } = this;
         gl.useProgram(this.program);
-        Object.entries(textures).forEach(([name, [target, texture, sampler = null]], unit) => {
+        Object.entries(textures).forEach(([name, [target, texture]], unit) => {
             gl.activeTexture(gl.TEXTURE0 + unit);
             gl.bindTexture(target, texture);
-            gl.bindSampler(unit, sampler);
             this.uniforms.get(name)?.(unit);
         });
         for (const [name, value] of Object.entries(values)) this.uniforms.get(name)?.(value);
@@ -238,17 +231,9 @@ export class Renderer {
         }
         gl.disable(gl.DITHER);
         gl.blendFunc(gl.ONE, gl.ONE);
-        gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-        gl.bindVertexArray(gl.createVertexArray());
         const { width, height, order: { length: layers } } = field;
         this.colors = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGBA8, gl.LINEAR, width, height, layers);
-        this.nearest = gl.createSampler();
-        for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
-            gl.samplerParameteri(this.nearest, name, gl.NEAREST);
-        }
-        for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
-            gl.samplerParameteri(this.nearest, name, gl.CLAMP_TO_EDGE);
-        }
+        this.target = { framebuffer: gl.createFramebuffer(), texture: null };
         this.table = new Float32Array(3 * NUMBERS.MAX_SAMPLES * 4);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
         gl.bufferData(gl.UNIFORM_BUFFER, this.table, gl.DYNAMIC_DRAW);
@@ -268,17 +253,15 @@ export class Renderer {
         return texture;
     }
 
-    // Returns the target of a picture of this size: light weighted by alpha, row 0 first. Frees a target of another size.
-    targetOf(width, height) {
-        const { gl, light } = this;
-        if (light?.width === width && light.height === height) return light;
-        gl.deleteFramebuffer(light?.framebuffer ?? null);
-        gl.deleteTexture(light?.texture ?? null);
+    // Binds the target, light weighted by alpha, row 0 first. Frees its texture if that has another size.
+    bindTarget(width, height) {
+        const { gl, target } = this;
+        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+        if (target.width === width && target.height === height) return;
+        gl.deleteTexture(target.texture);
         const texture = this.texture(gl.TEXTURE_2D, gl.RGBA16F, gl.NEAREST, width, height);
-        const framebuffer = gl.createFramebuffer();
-        gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-        return this.light = { framebuffer, texture, width, height };
+        Object.assign(target, { texture, width, height });
     }
 
     // Stores a view. rgba: bytes, sRGB-encoded; alpha is the disparity in the range of the field.
@@ -313,18 +296,14 @@ export class Renderer {
 
     begin(optics, part, width, height, level = NUMBERS.LEVELS[0]) {
         const { gl, field } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
-        const target = this.targetOf(width, height), passes = passCount(lens, field);
+        const passes = passCount(lens, field);
         // Half floats end at 65504 and are coarse near 0, where surfaces lie that no view sees: weights add up to about
         // half of their range. Powers of two keep the sum exact.
         const cameras = lens.diameter > 0 ? passes * lens.camerasPerPass : passes;
         const gain = 2 ** (15 - Math.ceil(Math.log2(cameras)));
-        this.picture = { lens, part, width, height, target, passes, gain, pass: 0, done: 0 };
-        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+        this.picture = { lens, part, width, height, passes, gain, pass: 0, done: 0 };
+        this.bindTarget(width, height);
         gl.clear(gl.COLOR_BUFFER_BIT);
-    }
-
-    get isComplete() {
-        return !this.picture || this.picture.pass === this.picture.passes;
     }
 
     // Draws the next pass, and shows what there is.
@@ -332,17 +311,6 @@ export class Renderer {
         const { picture: { lens, pass }, field } = this;
         this.pass(samplesOf(lens, field, pass));
         this.show();
-    }
-
-    // Adds the light of these cameras. more: switches, and further uniforms and textures, see `draw`. A camera with an
-    // answer has the shader find its view, see lens.frag.
-    pass(samples, ...more) {
-        const { gl, picture } = this;
-        this.setSamples(samples);
-        gl.enable(gl.BLEND);
-        this.drawLens(samples, ...more);
-        gl.disable(gl.BLEND);
-        Object.assign(picture, { pass: picture.pass + 1, done: picture.done + samples.length });
     }
 
     setSamples(samples) {
@@ -360,8 +328,10 @@ export class Renderer {
         gl.bufferSubData(gl.UNIFORM_BUFFER, 0, table);
     }
 
-    drawLens(samples, switches = [], values = {}, textures = {}) {
-        const { gl, field, picture: { lens, part, width, height, target, pass } } = this;
+    // Adds the light of these cameras. switches, values, textures: further ones, see `draw`. A camera with an answer has
+    // the shader find its view, see lens.frag.
+    pass(samples, switches = [], values = {}, textures = {}) {
+        const { gl, field, picture } = this, { lens, part, width, height, pass } = picture;
         const { hasDisparity, range: [farthest, nearest] } = field;
         const mostPx = field.layers.size > 1 ? NUMBERS.NEAR_PX : NUMBERS.ALONE_NEAR_PX;
         const isNear = samples.every(({ t, s, view, answer }) => {
@@ -369,22 +339,23 @@ export class Renderer {
             const isInCell = Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;
             return isInCell && Math.hypot(field.rowStep * dt, ds) * (nearest - farthest) <= mostPx;
         });
-        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR", ...switches], target, {
+        this.setSamples(samples);
+        gl.enable(gl.BLEND);
+        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR", ...switches], this.target, {
             sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
             focus_tilt: [0, 0], focus_range: 0, dolly: [0, 0], part: [part.x, part.y, part.width, part.height],
             field_part: [0, 0, 1, 1], view_step: [1, field.rowStep], ...values,
-        }, {
-            colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.colors, this.nearest],
-            ...textures,
-        });
+        }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], ...textures });
+        gl.disable(gl.BLEND);
+        Object.assign(picture, { pass: pass + 1, done: picture.done + samples.length });
     }
 
     // Shows the picture on the canvas, which gets its size.
     show() {
-        const { gl, canvas, picture: { width, height, target } } = this;
+        const { gl, canvas, target: { width, height, texture } } = this;
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-        const values = { exposure: 1, part: [0, 0, 1, 1] }, textures = { light_sum: [gl.TEXTURE_2D, target.texture] };
+        const values = { exposure: 1, part: [0, 0, 1, 1] }, textures = { light_sum: [gl.TEXTURE_2D, texture] };
         this.draw("present.frag", [], { framebuffer: null, width, height }, values, textures);
         gl.flush();
     }

@@ -103,7 +103,7 @@ class Page {
             this.isBest = level === NUMBERS.LEVELS[0];
             [this.drawnAt, this.changed] = [now, false];
             renderer.step();
-        } else if (!renderer.isComplete) {
+        } else if (renderer.picture.pass < renderer.picture.passes) {
             renderer.step();
         } else if (this.isBest && !this.swings) {
             document.documentElement.dataset.state = "still";

@@ -27,13 +27,13 @@ vec2 place_at(Ray ray, float disparity) {
     return ray.uv - ray.camera * ray.focus - ray.to_view * disparity;
 }
 
-// DISPARITY_IN_ALPHA: `disparities` are the colours, whose alpha is 0 for the farthest and 1 for the nearest.
+// DISPARITY_IN_ALPHA: colours have it in alpha, 0 for the farthest and 1 for the nearest.
 float disparity_at(vec2 at, float layer) {
-    vec4 texel = textureLod(disparities, vec3(at, layer), 0.0);
 #ifdef DISPARITY_IN_ALPHA
-    return mix(farthest, nearest, texel.a);
+    ivec2 texel = clamp(ivec2(floor(at * view_size_px)), ivec2(0), textureSize(colors, 0).xy - 1);
+    return mix(farthest, nearest, texelFetch(colors, ivec3(texel, layer), 0).a);
 #else
-    return texel.r;
+    return textureLod(disparities, vec3(at, layer), 0.0).r;
 #endif
 }
 
