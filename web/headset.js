@@ -6,24 +6,20 @@ import { $, say } from "./views.js";
 
 const DISTANCE_M = 1.5, SIDE_M = 1.2, NEAREST_M = 0.1;  // from the head to the window; its longer side
 const EYES_M = 0.063, HEAD_M = 0.1;  // distance between the eyes, and how far the head moves within the grid
-const SOFT = 0.2, MOST_MARGIN = 0.3;  // share of a limit where movement slows down; share of the picture that is cropped
+const MOST_MARGIN = 0.3;  // share of the picture that is cropped
 const MOST_PX = 6e5, MOST_SCALE = 2;  // of an eye's picture, which is drawn in one pass
-const DRAG = 0.03, EASE = 0.2;  // of a hand, in windows, to open the aperture; share of a change of focus, per frame
+const DRAG = 0.03, EASE = 0.2;  // of a hand, in windows, that opens no aperture; share of a change of focus, per frame
 const CORNERS = [[0, 0], [1, 0], [0, 1], [1, 1]];
 
-// Returns x or, near the limit, less and less of it.
-function soft(x, limit) {
-    const over = Math.abs(x) - (1 - SOFT) * limit;
-    return over > 0 ? Math.sign(x) * limit * (1 - SOFT * Math.exp(-over / (SOFT * limit))) : x;
-}
+const limited = (x, limit) => clamp(x, -limit, limit);
 
 // Returns viewpoint, dolly and the part of the picture along an axis. at, middle: where the ray of the eye, and of the
 // place between both, through the window's middle crosses the cameras' plane; side: of the window; all in view steps.
 // share: DISTANCE_M, in distances of the eye. shear: how far the surface in focus moves per view step, in pictures.
 function axisOf(at, middle, side, share, shear, [low, high]) {
-    const reach = Math.min((high - low) / 2, MOST_MARGIN / Math.abs(shear)), aside = soft(at - middle, reach);
-    const free = reach - Math.abs(aside), between = soft(middle, free), place = between + aside;
-    const turn = soft(side * (1 - share), 2 * (free - Math.abs(between))), scale = 1 - shear * turn;
+    const reach = Math.min((high - low) / 2, MOST_MARGIN / Math.abs(shear)), aside = limited(at - middle, reach);
+    const free = reach - Math.abs(aside), between = limited(middle, free), place = between + aside;
+    const turn = limited(side * (1 - share), 2 * (free - Math.abs(between))), scale = 1 - shear * turn;
     const dolly = turn / scale, shown = 1 - 2 * Math.abs(shear) * reach, size = shown * scale;
     const eye = (low + high) / 2 + (1 + dolly * shear) * place;
     return { eye, dolly, shown, start: 0.5 - size / 2 - shear * place, size };
@@ -64,30 +60,27 @@ class Headset {
         const scale = Math.min(MOST_SCALE, Math.sqrt(MOST_PX / views[0] / views[1]));
         this.px = views.map((side) => Math.max(Math.round(scale * side), 1));
         this.nearest = renderer.texture(gl.TEXTURE_2D, gl.RGBA32F, gl.NEAREST, field.columns, field.rows);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, field.columns, field.rows, gl.RGBA, gl.FLOAT, nearestViews(field));
         local.addEventListener("reset", () => (this.space = null));
-        session.addEventListener("selectstart", ({ inputSource }) => this.held.set(inputSource, {}));
+        session.addEventListener("selectstart", ({ frame, inputSource }) => this.select(frame, inputSource));
         session.addEventListener("selectend", ({ inputSource }) => this.held.delete(inputSource));
-        session.addEventListener("select", ({ frame, inputSource }) => this.select(frame, inputSource));
         session.addEventListener("squeeze", () => page.reset());
-        session.addEventListener("end", () => gl.deleteTexture(this.nearest));
     }
 
     frame(frame) {
-        const { page: { field, optics, renderer: { gl } }, session, whole } = this;
+        const { page: { field, optics }, session, whole } = this;
         session.requestAnimationFrame((now, next) => this.frame(next));
         this.space ??= this.standing(frame.getViewerPose(this.local));
         const pose = this.space && frame.getViewerPose(this.space);
         if (!pose) return;
         this.focus += EASE * (optics.focus - this.focus);
-        const eyes = pose.views.map(({ transform: { position: { x, y, z } } }) => [x, y, z]);
-        const middle = [0, 1, 2].map((i) => eyes.reduce((sum, eye) => sum + eye[i] / eyes.length, 0));
-        this.sight = sightOf(field, this.focus, whole, middle, middle);
-        const pointed = [...session.inputSources].flatMap((hand) => this.open(hand, this.pointed(frame, hand)));
-        gl.bindTexture(gl.TEXTURE_2D, this.nearest);
-        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, field.columns, field.rows, gl.RGBA, gl.FLOAT, nearestViews(field));
-        pose.views.forEach((view, i) => {
-            this.draw(view, sightOf(field, this.focus, whole, eyes[i], middle), [...pointed, -1, -1, -1, -1].slice(0, 4));
-        });
+        const placeOf = ({ transform: { position: { x, y, z } } }) => [x, y, z], head = placeOf(pose);
+        this.sight = sightOf(field, this.focus, whole, head, head);
+        const pointed = [...session.inputSources].flatMap((hand) => this.pointed(frame, hand));
+        for (const view of pose.views) {
+            const sight = sightOf(field, this.focus, whole, placeOf(view), head);
+            this.draw(view, sight, [...pointed, -1, -1, -1, -1].slice(0, 4));
+        }
     }
 
     // Draws an eye's picture, in one pass, and the window with it.
@@ -117,33 +110,33 @@ class Headset {
         return this.local.getOffsetReferenceSpace(new XRRigidTransform(place, orientation));
     }
 
-    // Returns the place of the window's plane that a hand points at, from the lower left corner, in windows; or null.
-    pointed(frame, { targetRaySpace }) {
-        const m = this.sight && frame.getPose(targetRaySpace, this.space)?.transform.matrix, far = m && m[14] / m[10];
-        return far > 0 ? [0, 1].map((i) => (m[12 + i] - far * m[8 + i]) / this.sight.size[i] + 0.5) : null;
-    }
-
-    // Opens the aperture while a hand that pinches or holds its trigger is dragged up. Returns the place, or one outside.
-    open(hand, place) {
-        const { page } = this, held = this.held.get(hand), up = held && place ? place[1] - (held.y ??= place[1]) : 0;
-        if (up && (held.drags ||= Math.abs(up) > DRAG)) {
-            held.y = place[1];
-            page.set({ aperture: page.optics.aperture + up * page.field.apertureLimits[1] });
+    // Returns the place of the window's plane that a hand points at, from the lower left corner, in windows, or none.
+    // Opens the aperture while the hand pinches or holds its trigger and is dragged up.
+    pointed(frame, hand) {
+        const { page, held, sight } = this, pose = sight && frame.getPose(hand.targetRaySpace, this.space);
+        const m = pose?.transform.matrix, far = m ? m[14] / m[10] : 0;
+        if (!(far > 0)) return [];
+        const place = [0, 1].map((i) => (m[12 + i] - far * m[8 + i]) / sight.size[i] + 0.5);
+        const up = place[1] - (held.get(hand) ?? place[1]), drag = up - limited(up, DRAG);
+        if (drag) {
+            held.set(hand, held.get(hand) + drag);
+            page.set({ aperture: page.optics.aperture + drag * page.field.apertureLimits[1] });
         }
-        return place ?? [-1, -1];
+        return place;
     }
 
-    // Focuses where a hand points, unless it dragged.
+    // Focuses where a hand points that begins to pinch or to hold its trigger.
     select(frame, hand) {
-        const { field } = this.page, [across, up] = this.pointed(frame, hand) ?? [-1, -1];
-        if (this.held.get(hand)?.drags || !field.middle || Math.min(across, up, 1 - across, 1 - up) < 0) return;
-        const { eye, dolly, part } = this.sight, u = part.x + across * part.width, v = part.y + (1 - up) * part.height;
+        const { page: { field }, sight } = this, [across, up] = this.pointed(frame, hand);
+        this.held.set(hand, up);
+        if (!field.middle || !(Math.min(across, up, 1 - across, 1 - up) >= 0)) return;
+        const { eye, dolly, part } = sight, u = part.x + across * part.width, v = part.y + (1 - up) * part.height;
         const from = { t: eye.t + dolly[1] * (v - 0.5), s: eye.s + dolly[0] * (u - 0.5) };
         this.page.set({ focus: pick(field, field.middle, from, u, v) });
     }
 }
 
-// Shows the button where there is a headset.
+// Shows the button where there is a headset. A session has the views that are there when it begins.
 export async function offerHeadset() {
     $("headset").hidden = !await navigator.xr?.isSessionSupported("immersive-vr").catch(() => false);
 }

@@ -43,7 +43,6 @@ class Page {
         }
         $("actions").addEventListener("click", () => $("actions").hidePopover?.());
         $("tilt").hidden = !globalThis.DeviceOrientationEvent || !matchMedia("(pointer: coarse)").matches;
-        offerHeadset();
         $("full").hidden = !document.fullscreenEnabled;
         this.showBar();
     }
@@ -286,7 +285,10 @@ async function start() {
             page ??= new Page(field);
             if (count === 1) page.use(field, renderer);  // the middle view shows alone until all are there
             document.documentElement.dataset.views = count;
-        }).catch((error) => say(`The views cannot be read: ${error.message}.`)).finally(() => page?.wake());
+        }).catch((error) => say(`The views cannot be read: ${error.message}.`)).finally(() => {
+            page?.wake();
+            offerHeadset();
+        });
     };
     canvas.addEventListener("webglcontextlost", (event) => {
         event.preventDefault();  // else the browser does not restore it

@@ -22,10 +22,10 @@ from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_apert
 from iibr_core.types import SRGB, ImageSize
 
 AVIF = "image/avif"
-SHADERS = "fullscreen.vert", "lens.frag", "present.frag"
-"""The desktop's shaders that the page has, see `web/renderer.js`."""
-PARTS = "preamble.glsl", "window.vert", "window.frag"
-"""The page's own parts of shaders."""
+SHADERS = "fullscreen.vert", "lens.frag", "present.frag", "window.vert", "window.frag"
+"""The shaders that the page has: the desktop's, and those of a headset, see `web/renderer.js`."""
+PREAMBLE = "preamble.glsl"
+"""The first lines of each shader in a page."""
 POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; media-src blob:; base-uri 'none';"
     " form-action 'none'"
@@ -113,8 +113,7 @@ def _shaders(folder: Path) -> dict[str, str]:
     """Return the shaders by name, without comments and without the version line, which the preamble replaces."""
     sources = {name: flatten(resource_folder("shaders") / name).text for name in SHADERS}
     without = {name: COMMENT.sub("", text.partition("\n")[2]) for name, text in sources.items()}
-    parts = {name: (folder / name).read_text("utf-8") for name in PARTS}
-    return {**parts, **without}
+    return {PREAMBLE: (folder / PREAMBLE).read_text("utf-8"), **without}
 
 
 def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:

@@ -1,7 +1,10 @@
+#version 330 core
 // A picture in a headset, with a dot where each hand points.
-uniform highp sampler2D light_sum;  // weighted by alpha, row 0 first
-uniform vec4 pointed;               // two places of the window, from its lower left corner
-uniform vec2 size;                  // of the window, m
+#include "srgb.glsl"
+
+uniform sampler2D light_sum;  // weighted by alpha, row 0 first
+uniform vec4 pointed;         // two places of the window, from its lower left corner
+uniform vec2 size;            // of the window, m
 
 in vec2 uv;
 out vec4 color;
@@ -16,7 +19,6 @@ void main() {
     ivec2 first = ivec2(floor(at));
     vec3 above = mix(light_of(first), light_of(first + ivec2(1, 0)), f.x);
     vec3 below = mix(light_of(first + ivec2(0, 1)), light_of(first + 1), f.x);
-    vec3 light = mix(above, below, f.y), srgb = 1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055;
     float away = min(length((uv - pointed.xy) * size), length((uv - pointed.zw) * size));
-    color = vec4(mix(mix(srgb, 12.92 * light, lessThan(light, vec3(0.0031308))), vec3(1.0), smoothstep(0.012, 0.008, away)), 1.0);
+    color = vec4(mix(srgb_from_linear(mix(above, below, f.y)), vec3(1.0), smoothstep(0.012, 0.008, away)), 1.0);
 }

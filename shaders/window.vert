@@ -1,3 +1,4 @@
+#version 330 core
 // A picture's corners in the clip space of an eye, the lower left one first.
 uniform vec4 corners[4];
 
