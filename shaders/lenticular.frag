@@ -1,11 +1,9 @@
 #version 330 core
 // Pictures woven for a lenticular display: every subpixel shows what is seen from the side to which its lens sends the
-// light, blended from the two nearest pictures. Row 0 of the screen lies at the bottom.
+// light, blended from the two nearest pictures. The rooms of pictures are stretched over the screen, whose row 0 lies at
+// the bottom.
 #include "sheet.glsl"
 
-uniform vec2 screen_px;
-uniform vec2 frame_px;       // room of each picture, which is stretched over the screen
-uniform vec2 picture_px;     // each picture, in the middle of its room
 uniform int views;           // number of pictures, the leftmost first
 uniform vec2 lenses_per_px;  // lenses that a step of one pixel crosses
 uniform float center;        // part of a lens
@@ -26,7 +24,7 @@ int cell_of(ivec2 pixel) {
 void main() {
     int first = 3 * cell_of(ivec2(gl_FragCoord.xy));
     vec2 at = mix(gl_FragCoord.xy, screen_px - gl_FragCoord.xy, is_mirrored) / screen_px;
-    vec2 place = (vec2(at.x, 1.0 - at.y) * frame_px - floor((frame_px - picture_px) / 2.0)) / picture_px;
+    vec2 place = (vec2(at.x, 1.0 - at.y) * frame_px - floor((frame_px - tile_px) / 2.0)) / tile_px;
     color = vec4(0.0, 0.0, 0.0, 1.0);
     if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(1.0)))) return;
     for (int i = 0; i < 3; i++) {

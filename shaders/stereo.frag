@@ -4,23 +4,19 @@
 #include "sheet.glsl"
 #include "srgb.glsl"
 
-uniform vec2 screen_px;
-uniform vec2 frame_px;    // room of each picture on the screen
-uniform vec2 picture_px;  // each picture, in the middle of its room
 uniform mat3 left_seen, right_seen;  // light of the display from the light of each eye's picture
 
-in vec2 uv;
 out vec4 color;
 
 // The light that an eye sees at a pixel of its room, from the upper left corner.
 vec3 seen(int eye, vec2 at) {
-    vec2 place = at - floor((frame_px - picture_px) / 2.0);
-    if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, picture_px))) return vec3(0.0);
+    vec2 place = at - floor((frame_px - tile_px) / 2.0);
+    if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, tile_px))) return vec3(0.0);
 #ifdef EXACT
-    ivec2 texel = ivec2(place.x + float(eye) * picture_px.x, picture_px.y - place.y);
+    ivec2 texel = ivec2(place.x + float(eye) * tile_px.x, tile_px.y - place.y);
     return texelFetch(sheet, texel, 0).rgb;
 #else
-    return picture_at(eye, place / picture_px);
+    return picture_at(eye, place / tile_px);
 #endif
 }
 

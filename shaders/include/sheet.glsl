@@ -1,7 +1,9 @@
 // Pictures of the same size side by side in one texture, rows bottom-up.
 uniform sampler2D sheet;
 uniform int sheet_columns;  // pictures in a row of the sheet, the lowest row first
-uniform vec2 tile_px;       // room of a picture in the sheet
+uniform vec2 tile_px;       // room of a picture in the sheet, and its size on the screen
+uniform vec2 screen_px;
+uniform vec2 frame_px;      // room of each picture on the screen, in whose middle it lies
 uniform vec2 drawn_px;      // size at which the pictures are drawn, in the lower left corner of their room
 
 // The colour of picture `index` at a place in it, as shares of its size, y down.

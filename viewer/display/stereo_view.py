@@ -53,8 +53,8 @@ class StereoView:
     @property
     def is_drawing(self) -> bool:
         """Whether the last picture can become better."""
-        if self._draws_in_turn:
-            return self.drawn is not None and self._complete < len(self.drawn.weave.eyes)
+        if self.drawn is not None and self._draws_in_turn:
+            return self._complete < len(self.drawn.weave.eyes)
         return any(not renderer.is_converged for renderer in self._renderers)
 
     @property

@@ -48,7 +48,7 @@ class Weaver:
         program = self._program(weave, drawn_px)
         self._sheet.texture.use(0)
         program.set_uniforms(sheet=0, sheet_columns=self._columns, tile_px=self._tile_px, drawn_px=drawn_px)
-        program.set_uniforms(screen_px=weave.size_px, frame_px=weave.frame_px, picture_px=self._tile_px)
+        program.set_uniforms(screen_px=weave.size_px, frame_px=weave.frame_px)
         self.screen.framebuffer.use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         program.draw()

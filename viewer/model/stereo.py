@@ -129,16 +129,13 @@ def warning(scene: Scene, stereo: Stereo) -> str:
         if monitor is None or (monitor.height, monitor.width) == display.screen:
             return ""
         return f"The calibration is that of a screen of {display.screen}, not of {monitor.words}."
-    shown_px = scene.width * eyes_at(scene, Optics(), stereo)[0].part.width
-    moved, plane = eye_distance(scene, stereo) / shown_px, screen_plane(scene, stereo)
-    far, near = ((edge - plane) * moved for edge in scene.disparity_range_px)
-    place, worst = ("before", near) if near >= -far else ("behind", -far)
+    moved = eye_distance(scene, stereo) / scene.width / eyes_at(scene, Optics(), stereo)[0].part.width
+    far, near = ((edge - screen_plane(scene, stereo)) * moved for edge in scene.disparity_range_px)
+    worst, place, remedy = max((near, "before", "nearer"), (-far, "behind", "farther"))
     if worst <= MAX_PARALLAX:
         return ""
-    return (
-        f"Parallax {place} the screen is {100 * worst:.1f} % of the width, and eyes bear 3 %: reduce the eye"
-        f" distance, or move the screen {'nearer' if place == 'before' else 'farther'}."
-    )
+    words = f"Parallax {place} the screen is {100 * worst:.1f} % of the width, and eyes bear 3 %"
+    return f"{words}: reduce the eye distance, or move the screen {remedy}."
 
 
 def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tuple[RenderSettings, ...]:
