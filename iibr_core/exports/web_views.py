@@ -43,7 +43,7 @@ RANGE_MARGIN, OUTLIERS = 0.05, 0.0002
 """Margin and quantile of the disparity range, the same as in the desktop's texture (`light_field_texture.py`)."""
 QUALITIES, DEPTH_QUALITY, FIRST_QUALITY = (82, 65, 48), 60, 50
 """Qualities of colours, the lower ones for budgets; of disparity; and of the first picture."""
-CRFS, CHROMA_CRF_STEP, DEPTH_CRF = dict(zip(QUALITIES, (24, 32, 40))), 10, 32
+CRFS, CHROMA_CRF_STEP, DEPTH_CRF = dict(zip(QUALITIES, (25, 32, 40))), 5, 32
 """Qualities of the streams of VP9, 0 to 63, the best first: of luma by the quality of colours, the step by which chroma
 has a higher value, and of disparity."""
 MAX_HALVINGS = 4
