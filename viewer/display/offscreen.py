@@ -192,8 +192,7 @@ class OffscreenScene(ExitStack):
         """Return the picture for a lenticular display, whose screen has this size."""
         self._prepare_gloss(self.state.optics.gloss)
         view, weave = StereoView(self.gl, self.view), stereo.weave_of(self.state, self.scene, size)
-        view.draw(weave, math.inf)
-        while view.is_drawing:
+        while view.drawn is None or view.is_drawing:
             view.draw(weave, math.inf)
         pixels = view.screen.read()
         view.release()

@@ -23,7 +23,7 @@ MAX_RENDERERS = 2
 class WovenPicture:
     """Everything that a woven picture depends on. passes: shown so far; see `Picture` for the other numbers."""
 
-    generation: int
+    field: LightFieldTexture
     views_uploaded: int
     previews: int
     weave: Weave
@@ -40,7 +40,6 @@ class StereoView:
         self._gl, self._scene_view = gl, scene_view
         self._weaver = Weaver(gl.ctx, scene_view.renderer.programs)
         self._renderers: list[Renderer] = []
-        self._field: LightFieldTexture | None = None
         self._begun, self._complete, self._drawn_at = -1, 0, 0.0
         self.drawn: WovenPicture | None = None
 
@@ -74,10 +73,10 @@ class StereoView:
         view, budget_s = self._scene_view, self._gl.frame_budget_s if budget_s is None else budget_s
         if view.views_uploaded == 0:
             return None
-        picture = WovenPicture(view.generation, view.views_uploaded, view.previews, weave)
+        picture = WovenPicture(view.renderer.drawn_field, view.views_uploaded, view.previews, weave)
         drawn = self.drawn
         if drawn is not None and replace(picture, views_uploaded=drawn.views_uploaded, passes=drawn.passes) == drawn:
-            if self._field is view.renderer.drawn_field and self.shows_all_views:
+            if self.shows_all_views:
                 return self._refined(drawn, budget_s) if self.is_drawing else drawn
             if time.perf_counter() - self._drawn_at < VIEW_REFRESH_S:
                 return drawn
@@ -90,7 +89,7 @@ class StereoView:
         for renderer in self._renderers:
             renderer.release()
         self._weaver.release()
-        self.drawn, self._field, self._renderers = None, None, []
+        self.drawn, self._renderers = None, []
 
     def _begin(self, weave: Weave, budget_s: float) -> None:
         """Draw each picture as well as the time is expected to allow, all at one level of quality."""
@@ -99,7 +98,7 @@ class StereoView:
         if len(self._renderers) != wanted:
             self.release()
             self._renderers = [Renderer(self._gl, view.renderer) for _ in range(wanted)]
-        self._field, level, converged = view.renderer.drawn_field, None, 0
+        level, converged = None, 0
         self._weaver.prepare(weave)
         each_s = budget_s / count + (OVERHEAD_S if wanted < count else 0.0)
         for i in sorted(range(count), key=lambda i: i != count // 2):  # the middle one decides on the level
