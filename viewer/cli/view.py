@@ -9,6 +9,7 @@ import typer
 
 from iibr_core.formats.lenticular import read_calibration
 from iibr_core.scenes.scene import Source
+from iibr_core.types import InputError
 from viewer.app.preferences_store import last_opened, user_folder
 from viewer.cli.option_records import option, with_option_records
 from viewer.cli.options import SCENE, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
@@ -47,6 +48,8 @@ def view(
     source = scene.source(path, grid, focus_disparity)
     require_heeded(context, path)
     require_source(source)
+    if stereo_mode is not None and calibration is not None:
+        raise InputError("--stereo arranges two pictures, --calibration tens of them: leave out one of both")
     if tracker is not None:
         address_of(tracker)
     shown = () if stereo_mode is None else (do(stereo.set_mode, stereo_mode), do(stereo.show, True))

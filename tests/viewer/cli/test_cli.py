@@ -62,6 +62,11 @@ def test_a_path_in_place_of_a_command_is_viewed(photo_path: Path, name: str) -> 
     assert "no such file" in alone if "missing" in name else "iibr screenshot" in alone
 
 
+def test_a_stereo_picture_is_for_two_eyes_or_for_a_lens(iibr: Iibr, photo_path: Path, tmp_path: Path) -> None:
+    words = "--stereo", "sbs", "--calibration", tmp_path / "visual.json"
+    assert "leave out one of both" in refusal_of(iibr("view", photo_path, *words))
+
+
 def test_a_tracker_has_an_address(iibr: Iibr, photo_path: Path) -> None:
     problem = refusal_of(iibr("view", photo_path, "--tracker", "tcp:4242"))
     assert "'tcp:4242' is no tracker: give udp:PORT or udp:HOST:PORT" in problem
