@@ -179,43 +179,27 @@ export function pick(field, middle, eye, u, v) {
 
 // ---- WebGL 2: programs of the desktop's shaders, textures, targets
 
-class Program {
-    constructor(gl, vertex, fragment, name) {
-        this.gl = gl;
-        this.program = gl.createProgram();
-        for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-            const shader = gl.createShader(kind);
-            gl.shaderSource(shader, source);
-            gl.compileShader(shader);
-            gl.attachShader(this.program, shader);
-        }
-        gl.linkProgram(this.program);
-        if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
-            const logs = gl.getAttachedShaders(this.program).map((shader) => gl.getShaderInfoLog(shader));
-            throw new Error(`${name}: ${gl.getProgramInfoLog(this.program)} ${logs.join(" ")}`);
-        }
-        this.uniforms = new Map();
-        for (let i = gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS) - 1; i >= 0; i--) {
-            const { name: declared, type } = gl.getActiveUniform(this.program, i);
-            const put = {
-                [gl.FLOAT]: "uniform1fv", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC4]: "uniform4fv",
-            }[type] ?? "uniform1iv";  // integers and samplers
-            const place = gl.getUniformLocation(this.program, declared);
-            if (place) this.uniforms.set(declared, (value) => gl[put](place, [value].flat()));
-        }
+// Returns a program, and functions that set its uniforms, by name.
+function linked(gl, vertex, fragment) {
+    const program = gl.createProgram(), uniforms = new Map();
+    for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+        const shader = gl.createShader(kind);
+        gl.shaderSource(shader, source);
+        gl.compileShader(shader);
+        gl.attachShader(program, shader);
     }
-
-    // Binds the program. textures: by the names of their samplers. Names that the compiler left out are skipped.
-    use(values, textures) {
-        const { gl } = this;
-        gl.useProgram(this.program);
-        Object.entries(textures).forEach(([name, [target, texture]], unit) => {
-            gl.activeTexture(gl.TEXTURE0 + unit);
-            gl.bindTexture(target, texture);
-            this.uniforms.get(name)?.(unit);
-        });
-        for (const [name, value] of Object.entries(values)) this.uniforms.get(name)?.(value);
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
+        const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
+        throw new Error(`${gl.getProgramInfoLog(program)} ${logs.join(" ")}`);
     }
+    const puts = { [gl.FLOAT]: "uniform1fv", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC4]: "uniform4fv" };
+    for (let i = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS) - 1; i >= 0; i--) {
+        const { name, type } = gl.getActiveUniform(program, i), put = puts[type] ?? "uniform1iv";  // integers, samplers
+        const place = gl.getUniformLocation(program, name);
+        if (place) uniforms.set(name, (value) => gl[put](place, [value].flat()));
+    }
+    return { program, uniforms };
 }
 
 export class Renderer {
@@ -274,18 +258,26 @@ export class Renderer {
         gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);
     }
 
-    // Draws with the program of a shader and its switches. values, textures: see Program.use.
+    // Draws with the program of a shader and its switches. values, textures: of uniforms and samplers by name; names that
+    // the compiler left out are skipped.
     draw(fragment, switches, { framebuffer, x = 0, y = 0, width, height }, values, textures) {
         const { gl, shaders } = this, names = switches.filter(Boolean), key = [fragment, ...names].join(" ");
         if (!this.programs.has(key)) {
             const defines = names.map((name) => `#define ${name} 1\n`).join("");
             const source = (name) => shaders["preamble.glsl"] + defines + shaders[name];
             const vertex = fragment === "window.frag" ? "window.vert" : "fullscreen.vert";
-            this.programs.set(key, new Program(gl, source(vertex), source(fragment), key));
+            this.programs.set(key, linked(gl, source(vertex), source(fragment)));
         }
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         gl.viewport(x, y, width, height);
-        this.programs.get(key).use(values, textures);
+        const { program, uniforms } = this.programs.get(key);
+        gl.useProgram(program);
+        Object.entries(textures).forEach(([name, [target, texture]], unit) => {
+            gl.activeTexture(gl.TEXTURE0 + unit);
+            gl.bindTexture(target, texture);
+            uniforms.get(name)?.(unit);
+        });
+        for (const [name, value] of Object.entries(values)) uniforms.get(name)?.(value);
         gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);  // the fourth corner of fullscreen.vert lies outside
     }
 
@@ -333,8 +325,8 @@ export class Renderer {
         const mostPx = field.layers.size > 1 ? NUMBERS.NEAR_PX : NUMBERS.ALONE_NEAR_PX;
         const isNear = samples.every(({ t, s, view, answer }) => {
             const [dt, ds] = answer ? [field.step, field.step] : [view.t - lens.eye.t - t, view.s - lens.eye.s - s];
-            const isInCell = Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;
-            return isInCell && Math.hypot(field.rowStep * dt, ds) * (nearest - farthest) <= mostPx;
+            const px = Math.hypot(field.rowStep * dt, ds) * (nearest - farthest);
+            return px <= mostPx && Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;
         });
         this.setSamples(samples);
         gl.enable(gl.BLEND);

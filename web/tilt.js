@@ -4,8 +4,6 @@ import { clamp } from "./renderer.js";
 
 const NOISE_DEG = 0.4;  // Largest turn that leaves the picture as it is.
 
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-
 // Returns where a device's right, top and front point to in the world: W3C's angles, Z-X'-Y''.
 function axesOf(event) {
     const turns = [event.alpha, event.beta, event.gamma].map((angle) => angle * Math.PI / 180);
@@ -24,14 +22,15 @@ export class Tilt {
         if (this.angle !== screenAngle) {
             const angle = screenAngle * Math.PI / 180, [c, s] = [Math.cos(angle), Math.sin(angle)];
             const mixed = (x, y) => right.map((_, i) => x * right[i] + y * top[i]);
-            Object.assign(this, { angle: screenAngle, axes: { t: mixed(-s, -c), s: mixed(c, -s) }, t: 0, s: 0 });
+            Object.assign(this, { angle: screenAngle, axes: [mixed(-s, -c), mixed(c, -s)], turned: [0, 0] });
         }
-        const turned = (axis) => {
-            const ahead = Math.asin(clamp(dot(front, this.axes[axis]), -1, 1)) * 180 / Math.PI - this[axis];
+        const [t, s] = this.axes.map((axis, i) => {
+            const sine = axis.reduce((sum, x, k) => sum + x * front[k], 0);
+            const ahead = Math.asin(clamp(sine, -1, 1)) * 180 / Math.PI - this.turned[i];
             const beyond = ahead - clamp(ahead, -NOISE_DEG, NOISE_DEG);
-            this[axis] += beyond;
+            this.turned[i] += beyond;
             return beyond;
-        };
-        return { t: turned("t"), s: turned("s") };
+        });
+        return { t, s };
     }
 }

@@ -280,15 +280,14 @@ async function start() {
         } catch (error) {
             return say(`The middle picture only: this browser draws no WebGL 2 (${error.message}).`);
         }
-        return load(field, renderer, (count) => {
+        await load(field, renderer, (count) => {
             if (renderer !== newest) return;
             page ??= new Page(field);
             if (count === 1) page.use(field, renderer);  // the middle view shows alone until all are there
             document.documentElement.dataset.views = count;
-        }).catch((error) => say(`The views cannot be read: ${error.message}.`)).finally(() => {
-            page?.wake();
-            offerHeadset();
         });
+        page?.wake();
+        return offerHeadset();
     };
     canvas.addEventListener("webglcontextlost", (event) => {
         event.preventDefault();  // else the browser does not restore it

@@ -38,18 +38,25 @@ async function* decoded(name, chunks) {
 // The frames of a stream by an element that is stepped, where there is no WebCodecs: on pages by plain http, too.
 async function* stepped(name, chunks) {
     const video = document.createElement("video"), file = new Blob([bytesOf(name)], { type: "video/webm" });
-    const after = (event, changes) => new Promise((done, fail) => {
-        Object.assign(video, { [event]: done, onerror: fail, ...changes });
-        setTimeout(fail, SEEK_MS);
+    const after = (event, changes, frame = Promise.resolve()) => new Promise((done, fail) => {
+        Object.assign(video, { [event]: () => frame.then(done), onerror: fail, ...changes });
+        const late = () => (document.hidden ? setTimeout(late, SEEK_MS) : fail(new Error("the video stands still")));
+        setTimeout(late, SEEK_MS);  // a page in the background waits: it gets no frames
     });
     await after("onloadeddata", { muted: true, playsInline: true, preload: "auto", src: URL.createObjectURL(file) });
     for (const i of chunks.keys()) {
-        const isShown = new Promise((done) => video.requestVideoFrameCallback?.(done) ?? done());
-        await after("onseeked", { currentTime: (i + 0.5) / RATE });
-        await isShown;
+        const frame = new Promise((done) => video.requestVideoFrameCallback?.(done) ?? done());
+        await after("onseeked", { currentTime: (i + 0.5) / RATE }, frame);
         yield video;
     }
     URL.revokeObjectURL(video.src);
+}
+
+// Returns how many levels too dark luma is drawn: 2 in WebKitGTK.
+function missingLevels() {
+    if (!globalThis.VideoFrame) return 0;
+    const size = { codedWidth: 2, codedHeight: 2 }, luma85 = Uint8Array.of(89, 89, 89, 89, 128, 128);
+    return 85 - drawn(new VideoFrame(luma85, { format: "I420", timestamp: 0, ...size }), 1, 1)[0];
 }
 
 // Levels 0 to 255 of a frame whose luma is 16 to 235, by `copyTo` where that gives luma: drawing is less exact.
@@ -61,20 +68,20 @@ async function levelsOf(frame, width, height) {
             for (let at = offset + y * stride, end = at + width; at < end;) levels[i++] = (luma[at++] - 16) * 255 / 219;
         }
     } else {
-        const pixels = drawn(frame, width, height);
-        for (let i = 0; i < levels.length; i++) levels[i] = pixels[4 * i];
+        const pixels = drawn(frame, width, height), missing = missingLevels();
+        for (let i = 0; i < levels.length; i++) levels[i] = pixels[4 * i] + missing;
     }
     frame.close?.();  // a video has none
     return levels;
 }
 
 // Views of streams as RGBA, alpha: disparity. Colours are as in JPEG.
-async function* viewsOfStreams({ chunks, order, width, height }, framesOf) {
-    const streams = Object.fromEntries(Object.keys(chunks).map((name) => [name, framesOf(name, chunks[name])]));
-    const next = async (name, rows) => streams[name] && levelsOf((await streams[name].next()).value, width, rows);
-    for (let view = 0; view < order.length; view++) {
-        const all = [next("luma", height), next("chroma", 2 * height), next("disparity", height)];
-        const [luma, chroma, disparity] = await Promise.all(all), rgba = new Uint8ClampedArray(4 * luma.length);
+async function* viewsOfStreams({ chunks, order: { length: count }, width, height }, framesOf) {
+    const streams = Object.entries(chunks).map(([name, places]) => framesOf(name, places));
+    const next = async (stream, i) => levelsOf((await stream.next()).value, width, i === 1 ? 2 * height : height);
+    while (count--) {
+        const [luma, chroma, disparity] = await Promise.all(streams.map(next));
+        const rgba = new Uint8ClampedArray(4 * luma.length);
         for (let i = 0, at = 0; i < luma.length; i++) {
             const y = luma[i], blue = chroma[i] - 128, red = chroma[luma.length + i] - 128;
             rgba[at++] = y + 1.402 * red;
@@ -113,12 +120,12 @@ async function* viewsOfPictures({ hasDisparity, width, height, colorSpace }) {
 // Stores all views; `onView` hears of each. The middle one is shown alone until all are there.
 export async function load(field, renderer, onView) {
     const { order, chunks, layers, hasDisparity } = field;
-    const streams = chunks.luma ? [decoded, stepped].map((frames) => () => viewsOfStreams(field, frames)) : [];
+    const streams = chunks.luma ? [decoded, stepped].map((frames) => viewsOfStreams(field, frames)) : [];
     let count = 0;
-    for (const views of [...streams, () => viewsOfPictures(field)]) {
+    for (const views of [...streams, viewsOfPictures(field)]) {
         count = 0;
         try {
-            for await (const rgba of views()) {
+            for await (const rgba of views) {
                 if (!count && hasDisparity) field.middle = rgba.filter((_, i) => i % 4 === 3);
                 renderer.upload(count, rgba);
                 onView(++count);

@@ -222,6 +222,9 @@ def test_readers_of_screens_find_words(shown) -> None:
 
 
 HIDE_DECODER, HIDE_VIDEO = "delete globalThis.VideoDecoder;", "delete HTMLMediaElement.prototype.src;"
+NO_FRAMES = "HTMLVideoElement.prototype.requestVideoFrameCallback = () => 1;"
+NO_SEEKS = "Object.defineProperty(HTMLMediaElement.prototype, 'onseeked', { set() {} });"
+QUICK_TIMERS = "{ const given = setTimeout; globalThis.setTimeout = (call, ms) => given(call, ms / 20); }"
 
 
 def test_a_stepped_video_shows_the_same_as_a_decoder(tab, shown, page) -> None:
@@ -239,8 +242,9 @@ def test_a_stepped_video_shows_the_same_as_a_decoder(tab, shown, page) -> None:
     assert psnr(canvas(tab), decoded) >= LEAST_PSNR_OF_HALVES_DB
 
 
-def test_without_video_the_middle_view_moves_by_its_depth(tab, page) -> None:
-    tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_DECODER + HIDE_VIDEO)
+@pytest.mark.parametrize("fault", [HIDE_VIDEO, NO_FRAMES, NO_SEEKS], ids=["no source", "no frames", "no seeks"])
+def test_without_video_the_middle_view_moves_by_its_depth(tab, page, fault) -> None:
+    tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_DECODER + QUICK_TIMERS + fault)
     tab.resize(WIDTH, HEIGHT)
     tab.open(page.as_uri())
     tab.wait_until("document.getElementById('status').textContent.includes('shows one view and its depth')")
