@@ -50,8 +50,6 @@ function nearestViews({ rows, columns, step, layers, hasDisparity }) {
     }).flat());
 }
 
-const times = (m, v) => [0, 1, 2, 3].map((row) => v.reduce((sum, x, i) => sum + m[4 * i + row] * x, 0));
-
 class Headset {
     constructor(page, session, local) {
         const { renderer, field } = page, { gl } = renderer, views = [field.width, field.height];
@@ -90,15 +88,14 @@ class Headset {
         const { lens } = renderer.picture, [down, across] = NUMBERS.SQRT_STEPS;
         const cameras = aperture > 0 ? samplesOf(lens, { ...field, hasDisparity: true }, 0)
             : CORNERS.map((corner) => ({ t: 0, s: 0, view: { t: 0, s: 0 }, weight: 1, answer: [...corner, 1] }));
-        renderer.pass(cameras.map((one, i) => ({ answer: [fraction(i, across), fraction(i, down), 0], ...one })), ["DOLLY"],
-            { dolly, eye_in_grid: [eye.s + (field.columns >> 1), eye.t + (field.rows >> 1)] },
-            { nearest_views: [gl.TEXTURE_2D, nearest] });
+        const samples = cameras.map((one, i) => ({ answer: [fraction(i, across), fraction(i, down), 0], ...one }));
+        const inGrid = [eye.s + (field.columns >> 1), eye.t + (field.rows >> 1)];
+        renderer.pass(samples, ["DOLLY"], { dolly, eye_in_grid: inGrid }, { nearest_views: [gl.TEXTURE_2D, nearest] });
         const { transform: { inverse }, projectionMatrix } = view, layer = this.session.renderState.baseLayer;
-        const corners = CORNERS.map(([x, y]) => [(x - 0.5) * size[0], (y - 0.5) * size[1], 0, 1])
-            .flatMap((place) => times(projectionMatrix, times(inverse.matrix, place)));
         const { x, y, width, height } = layer.getViewport(view), { framebuffer } = layer;
-        renderer.draw("window.frag", [], { framebuffer, x, y, width, height },
-            { "corners[0]": corners, size, pointed }, { light_sum: [gl.TEXTURE_2D, renderer.target.texture] });
+        const values = { "to_eye[0]": [...inverse.matrix], "to_clip[0]": [...projectionMatrix], size, pointed };
+        const textures = { light_sum: [gl.TEXTURE_2D, renderer.target.texture] };
+        renderer.draw("window.frag", [], { framebuffer, x, y, width, height }, values, textures);
     }
 
     // Returns the space of a window that stands upright before the head: x right, y up, z towards the head.

@@ -28,14 +28,8 @@ function openness(t, s, cut) {
 function measure(cut) {
     const side = NUMBERS.GRID_SIDE;
     const places = Array.from({ length: side }, (_, i) => reachOf(cut) * ((i + 0.5) / side - 0.5));
-    let total = 0, moment = 0;
-    for (const t of places) {
-        for (const s of places) {
-            const weight = openness(t, s, cut);
-            total += weight;
-            moment += weight * (t * t + s * s);
-        }
-    }
+    const points = places.flatMap((t) => places.map((s) => ({ weight: openness(t, s, cut), square: t * t + s * s })));
+    const total = sumOf(points), moment = points.reduce((sum, { weight, square }) => sum + weight * square, 0);
     return { area: Math.min(total / side ** 2 * 4 / Math.PI, 1), moment: moment / total / 2 };
 }
 
@@ -209,7 +203,8 @@ export class Renderer {
         if (!extensions.some((name) => gl?.getExtension(name))) throw new Error("no WebGL 2 that draws half floats");
         Object.assign(this, { gl, canvas, shaders, field, programs: new Map() });
         if ("drawingBufferColorSpace" in gl) gl.drawingBufferColorSpace = field.colorSpace;
-        if (Math.max(field.width, field.height) > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new Error("too large views");
+        const side = Math.max(field.width, field.height);
+        if (side > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new Error(`no textures of ${side} pixels`);
         gl.disable(gl.DITHER);
         gl.blendFunc(gl.ONE, gl.ONE);
         const { width, height, order: { length: layers } } = field;
@@ -258,8 +253,8 @@ export class Renderer {
         gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);
     }
 
-    // Draws with the program of a shader and its switches. values, textures: of uniforms and samplers by name; names that
-    // the compiler left out are skipped.
+    // Draws with the program of a shader and its switches. values, textures: of uniforms and samplers by name; those
+    // that the compiler left out are skipped.
     draw(fragment, switches, { framebuffer, x = 0, y = 0, width, height }, values, textures) {
         const { gl, shaders } = this, names = switches.filter(Boolean), key = [fragment, ...names].join(" ");
         if (!this.programs.has(key)) {
@@ -317,8 +312,8 @@ export class Renderer {
         gl.bufferSubData(gl.UNIFORM_BUFFER, 0, table);
     }
 
-    // Adds the light of these cameras. switches, values, textures: further ones, see `draw`. A camera with an answer has
-    // the shader find its view, see lens.frag.
+    // Adds the light of these cameras. switches, values, textures: further ones, see `draw`. If a camera has an answer,
+    // the shader finds its view, see lens.frag.
     pass(samples, switches = [], values = {}, textures = {}) {
         const { gl, field, picture } = this, { lens, part, width, height, pass } = picture;
         const { hasDisparity, range: [farthest, nearest] } = field;

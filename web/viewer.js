@@ -38,20 +38,11 @@ class Page {
         // A finger shows the bar only after its tap: a button that came up under it would take the click.
         document.addEventListener("pointermove", ({ pointerType }) => pointerType === "touch" || this.showBar());
         for (const name of ["click", "keydown", "input"]) document.addEventListener(name, () => this.showBar());
-        for (const button of document.querySelectorAll("button[data-do]")) {
-            button.addEventListener("click", () => this[button.dataset.do]());
-        }
+        $("bar").addEventListener("click", ({ target }) => this[target.dataset.do]?.());
         $("actions").addEventListener("click", () => $("actions").hidePopover?.());
         $("tilt").hidden = !globalThis.DeviceOrientationEvent || !matchMedia("(pointer: coarse)").matches;
         $("full").hidden = !document.fullscreenEnabled;
         this.showBar();
-    }
-
-    // Draws by this renderer from now on: the first one, or the next when the graphics driver lost its data.
-    use(field, renderer) {
-        Object.assign(this, { field, renderer });
-        this.canvas.hidden = false;
-        this.set({});
     }
 
     // Changes the optics; a hand's change ends the swing.
@@ -91,18 +82,17 @@ class Page {
         this.asked = 0;
         if (this.session || renderer.gl.isContextLost()) return;  // a headset shows the picture
         if (this.swings) this.swing(now);
-        const rests = now - this.drawnAt > 150;
-        if (this.changed || (this.level && rests && !this.isBest)) {
+        const took = now - this.drawnAt;
+        if (this.changed || (took > 150 && !this.isBest)) {
             // As good as there is time for while the hand moves, the best once it rests.
-            const took = now - this.drawnAt;
             const change = this.changed && took < 400 ? (took > SLOW_MS) - (took < QUICK_MS) : 0;
             this.level = clamp(this.level + change, 0, NUMBERS.LEVELS.length - 1);
             const level = NUMBERS.LEVELS[this.changed ? this.level : 0];
             renderer.begin(this.optics, this.part, ...this.size(level.scale), level);
             this.isBest = level === NUMBERS.LEVELS[0];
             [this.drawnAt, this.changed] = [now, false];
-            renderer.step();
-        } else if (renderer.picture.pass < renderer.picture.passes) {
+        }
+        if (renderer.picture.pass < renderer.picture.passes) {
             renderer.step();
         } else if (this.isBest && !this.swings) {
             document.documentElement.dataset.state = "still";
@@ -283,7 +273,11 @@ async function start() {
         await load(field, renderer, (count) => {
             if (renderer !== newest) return;
             page ??= new Page(field);
-            if (count === 1) page.use(field, renderer);  // the middle view shows alone until all are there
+            if (count === 1) {  // the middle view shows alone until all are there
+                Object.assign(page, { field, renderer });
+                canvas.hidden = false;
+                page.set({});
+            }
             document.documentElement.dataset.views = count;
         });
         page?.wake();
