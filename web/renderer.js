@@ -248,9 +248,8 @@ export class Renderer {
             rgba[i + 1] = rootOf[rgba[i + 1]];
             rgba[i + 2] = rootOf[rgba[i + 2]];
         }
-        const data = new Uint8Array(rgba.buffer);
         gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.colors);
-        gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);
+        gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
     }
 
     // Draws with the program of a shader and its switches. values, textures: of uniforms and samplers by name; those
@@ -290,11 +289,14 @@ export class Renderer {
         gl.clear(gl.COLOR_BUFFER_BIT);
     }
 
-    // Draws the next pass, and shows what there is.
+    // Draws the next pass, and shows what there is on the canvas, which gets the picture's size.
     step() {
-        const { picture: { lens, pass }, field } = this;
+        const { gl, canvas, field, picture: { lens, pass }, target: { width, height, texture } } = this;
         this.pass(samplesOf(lens, field, pass));
-        this.show();
+        if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+        const values = { exposure: 1, part: [0, 0, 1, 1] }, textures = { light_sum: [gl.TEXTURE_2D, texture] };
+        this.draw("present.frag", [], { framebuffer: null, width, height }, values, textures);
+        gl.flush();
     }
 
     setSamples(samples) {
@@ -328,19 +330,10 @@ export class Renderer {
         this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR", ...switches], this.target, {
             sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
-            focus_tilt: [0, 0], focus_range: 0, dolly: [0, 0], part: [part.x, part.y, part.width, part.height],
-            field_part: [0, 0, 1, 1], view_step: [1, field.rowStep], ...values,
+            part: [part.x, part.y, part.width, part.height], field_part: [0, 0, 1, 1], view_step: [1, field.rowStep],
+            ...values,  // others stay 0
         }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], ...textures });
         gl.disable(gl.BLEND);
         Object.assign(picture, { pass: pass + 1, done: picture.done + samples.length });
-    }
-
-    // Shows the picture on the canvas, which gets its size.
-    show() {
-        const { gl, canvas, target: { width, height, texture } } = this;
-        if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-        const values = { exposure: 1, part: [0, 0, 1, 1] }, textures = { light_sum: [gl.TEXTURE_2D, texture] };
-        this.draw("present.frag", [], { framebuffer: null, width, height }, values, textures);
-        gl.flush();
     }
 }
