@@ -209,7 +209,7 @@ export class Renderer {
         gl.blendFunc(gl.ONE, gl.ONE);
         const { width, height, order: { length: layers } } = field;
         this.colors = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGBA8, gl.LINEAR, width, height, layers);
-        this.target = { framebuffer: gl.createFramebuffer(), texture: null };
+        this.target = { framebuffer: gl.createFramebuffer(), texture: null };  // light weighted by alpha, row 0 first
         this.table = new Float32Array(3 * NUMBERS.MAX_SAMPLES * 4);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
         gl.bufferData(gl.UNIFORM_BUFFER, this.table, gl.DYNAMIC_DRAW);
@@ -227,17 +227,6 @@ export class Renderer {
         for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, name, filter);
         for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(target, name, gl.CLAMP_TO_EDGE);
         return texture;
-    }
-
-    // Binds the target, light weighted by alpha, row 0 first. Frees its texture if that has another size.
-    bindTarget(width, height) {
-        const { gl, target } = this;
-        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-        if (target.width === width && target.height === height) return;
-        gl.deleteTexture(target.texture);
-        const texture = this.texture(gl.TEXTURE_2D, gl.RGBA16F, gl.NEAREST, width, height);
-        gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-        Object.assign(target, { texture, width, height });
     }
 
     // Stores a view. rgba: bytes, sRGB-encoded; alpha is the disparity in the range of the field.
@@ -277,15 +266,22 @@ export class Renderer {
 
     // ---- Pictures, which are sums of passes: see accumulation.py and passes.py
 
+    // Clears the target, whose texture is another one for another size.
     begin(optics, part, width, height, level = NUMBERS.LEVELS[0]) {
-        const { gl, field } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
+        const { gl, field, target } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
         const passes = passCount(lens, field);
         // Half floats end at 65504 and are coarse near 0, where surfaces lie that no view sees: weights add up to about
         // half of their range. Powers of two keep the sum exact.
         const cameras = lens.diameter > 0 ? passes * lens.camerasPerPass : passes;
         const gain = 2 ** (15 - Math.ceil(Math.log2(cameras)));
         this.picture = { lens, part, width, height, passes, gain, pass: 0, done: 0 };
-        this.bindTarget(width, height);
+        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+        if (target.width !== width || target.height !== height) {
+            gl.deleteTexture(target.texture);
+            const texture = this.texture(gl.TEXTURE_2D, gl.RGBA16F, gl.NEAREST, width, height);
+            gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+            Object.assign(target, { texture, width, height });
+        }
         gl.clear(gl.COLOR_BUFFER_BIT);
     }
 
@@ -307,8 +303,7 @@ export class Renderer {
             const number = lens.diameter === 0 ? pass : done + i;
             const within = SQRT_STEPS.slice(3).map((step) => fraction(number, step) - 0.5 + OFF_BORDER_PX);
             table.set([s, t, ...within], 4 * i);
-            const toView = [view.s - lens.eye.s - s, view.t - lens.eye.t - t, 0];
-            table.set(answer ?? toView, 4 * (MAX_SAMPLES + i));
+            table.set(answer ?? [view.s - lens.eye.s - s, view.t - lens.eye.t - t, 0], 4 * (MAX_SAMPLES + i));
             table.set([layers.get(hash(view)), Number(hasDisparity), gain * weight, 0], 4 * (2 * MAX_SAMPLES + i));
         });
         gl.bufferSubData(gl.UNIFORM_BUFFER, 0, table);
