@@ -62,12 +62,13 @@ export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
 }
 
 // ---- Which stored views answer the cameras: plain numbers, see view_sampling.py. field: { rows, columns, width,
-// height, range, hasDisparity, step, rowStep, layers }; step: between views that are there, in view steps, the middle one
-// among them; rowStep: distance between rows, in distances between columns; layers: theirs, by "t,s". Samples are
+// height, range, hasDisparity, step, rowStep, layers }; step: between views that are there, in view steps, the middle
+// one among them; rowStep: distance between rows, in distances between columns; layers: theirs, by "t,s". Samples are
 // { t, s, view, weight }: a camera's place from the eye, the view that answers it, and how much it counts.
 
 // Returns the first and the last offset of the stored views along an axis of `count` views.
-export const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
+export const ends = (count, step) => (
+    [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step));
 
 // Returns the views before and after a place along an axis with their shares, without shares of 0.
 function bracket(x, count, step) {

@@ -56,32 +56,41 @@ async function* stepped(name, chunks) {
 function missingLevels() {
     if (!globalThis.VideoFrame) return 0;
     const size = { codedWidth: 2, codedHeight: 2 }, luma85 = Uint8Array.of(89, 89, 89, 89, 128, 128);
-    return 85 - drawn(new VideoFrame(luma85, { format: "I420", timestamp: 0, ...size }), 1, 1)[0];
+    const frame = new VideoFrame(luma85, { format: "I420", timestamp: 0, ...size }), [drawn85] = drawn(frame, 1, 1);
+    frame.close();
+    return 85 - drawn85;
 }
 
-// Levels 0 to 255 of a frame whose luma is 16 to 235, by `copyTo` where that gives luma: drawing is less exact.
-async function levelsOf(frame, width, height) {
+// The frames of a stream as levels 0 to 255, from a luma of 16 to 235: by `copyTo` where that gives luma, as drawing is
+// less exact. All frames are written into one array.
+function levelsReader(frames, width, height) {
     const levels = new Uint8ClampedArray(width * height);
-    if (/^(I420|NV12)/.test(frame.format)) {
-        const luma = new Uint8Array(frame.allocationSize()), [{ offset, stride }] = await frame.copyTo(luma);
-        for (let i = 0, y = 0; y < height; y++) {
-            for (let at = offset + y * stride, end = at + width; at < end;) levels[i++] = (luma[at++] - 16) * 255 / 219;
+    let planes = new Uint8Array(0), missing;
+    return async () => {
+        const frame = (await frames.next()).value;
+        if (/^(I420|NV12)/.test(frame.format)) {
+            if (planes.length < frame.allocationSize()) planes = new Uint8Array(frame.allocationSize());
+            const [{ offset, stride }] = await frame.copyTo(planes);
+            for (let i = 0, row = offset; i < levels.length; row += stride) {
+                for (let x = 0; x < width; x++) levels[i++] = (planes[row + x] - 16) * 255 / 219;
+            }
+        } else {
+            const pixels = drawn(frame, width, height);
+            missing ??= missingLevels();
+            for (let i = 0; i < levels.length; i++) levels[i] = pixels[4 * i] + missing;
         }
-    } else {
-        const pixels = drawn(frame, width, height), missing = missingLevels();
-        for (let i = 0; i < levels.length; i++) levels[i] = pixels[4 * i] + missing;
-    }
-    frame.close?.();  // a video has none
-    return levels;
+        frame.close?.();  // a video has none
+        return levels;
+    };
 }
 
-// Views of streams as RGBA, alpha: disparity. Colours are as in JPEG.
-async function* viewsOfStreams({ chunks, order: { length: count }, width, height }, framesOf) {
-    const streams = Object.entries(chunks).map(([name, places]) => framesOf(name, places));
-    const next = async (stream, i) => levelsOf((await stream.next()).value, width, i === 1 ? 2 * height : height);
-    while (count--) {
-        const [luma, chroma, disparity] = await Promise.all(streams.map(next));
-        const rgba = new Uint8ClampedArray(4 * luma.length);
+// Views of streams as RGBA, alpha: disparity, all in one array. Colours are as in JPEG.
+async function* viewsOfStreams({ chunks, order, width, height }, framesOf) {
+    const readers = Object.entries(chunks).map(([name, places], i) => (
+        levelsReader(framesOf(name, places), width, i === 1 ? 2 * height : height)));
+    const rgba = new Uint8ClampedArray(4 * width * height);
+    for (let count = order.length; count--;) {
+        const [luma, chroma, disparity] = await Promise.all(readers.map((next) => next()));
         for (let i = 0, at = 0; i < luma.length; i++) {
             const y = luma[i], blue = chroma[i] - 128, red = chroma[luma.length + i] - 128;
             rgba[at++] = y + 1.402 * red;
