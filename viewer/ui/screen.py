@@ -52,9 +52,10 @@ def build_screen(
             draw_marks(state, scene, layout, picture, frame)
             if textures.minimap is not None:
                 draw_minimap(layout, textures.minimap)
-    actions = filmstrip(state, layout, thumbnails)
-    actions += chips(state, layout) + panel_handle(state, layout) + panel(state, layout)
-    return actions + welcome(state, layout) + notices(state, layout) + prompts(state, layout)
+    actions = []
+    if woven_texture is None:  # each eye sees half of a stereo picture: nothing lies over it unasked
+        actions = filmstrip(state, layout, thumbnails) + chips(state, layout) + panel_handle(state, layout)
+    return actions + panel(state, layout) + welcome(state, layout) + notices(state, layout) + prompts(state, layout)
 
 
 def _image(texture: int, corners: tuple[float, float, float, float]) -> None:
