@@ -21,7 +21,11 @@ function drawn(image, width, height, colorSpace, scaled = []) {
 async function* decoded(name, chunks) {
     const data = bytesOf(name), frames = [];
     let wake = null;
-    const decoder = new VideoDecoder({ output: (frame) => wake?.(frames.push(frame)), error: () => wake?.() });
+    const output = (frame) => {
+        frames.push(frame);
+        wake?.();
+    };
+    const decoder = new VideoDecoder({ output, error: () => wake?.() });
     decoder.ondequeue = () => wake?.();
     decoder.configure(VP9);
     for (const [i, [begin, size]] of chunks.entries()) {

@@ -242,6 +242,15 @@ def test_a_stepped_video_shows_the_same_as_a_decoder(tab, shown, page) -> None:
     assert psnr(canvas(tab), decoded) >= LEAST_PSNR_OF_HALVES_DB
 
 
+def test_frames_that_no_queue_announces_are_shown(tab, page) -> None:
+    """A decoder may take chunks as fast as they come: all frames then arrive while the last ones are asked for."""
+    no_queue = "Object.defineProperty(VideoDecoder.prototype, 'decodeQueueSize', { get: () => 0 });"
+    tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_VIDEO + no_queue)
+    tab.open(page.as_uri())
+    wait_until_still(tab)
+    assert tab.evaluate("+document.documentElement.dataset.views") == 9
+
+
 @pytest.mark.parametrize("fault", [HIDE_VIDEO, NO_FRAMES, NO_SEEKS], ids=["no source", "no frames", "no seeks"])
 def test_without_video_the_middle_view_moves_by_its_depth(tab, page, fault) -> None:
     tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_DECODER + QUICK_TIMERS + fault)
