@@ -42,13 +42,10 @@ class Stream:
 def can_encode() -> bool:
     """Return whether PyAV is installed, with an encoder of VP9."""
     try:
-        from av.codec.codec import Codec, UnknownCodecError
+        from av import codecs_available
     except ImportError:
         return False
-    try:
-        return bool(Codec(CODEC, "w"))
-    except UnknownCodecError:
-        return False
+    return CODEC in codecs_available
 
 
 def luma_of(colors: Bytes) -> Bytes:
