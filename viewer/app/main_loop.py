@@ -116,6 +116,8 @@ class App:
         actions += self._input(pointer, layout)
         woven_picture = woven and self.stereo_screen.view.drawn
         self._show((picture, textures, self._ui.end(), layout, look, self.window.damages, sharp, woven_picture))
+        if self.frames_shown and (picture or self.state.source is None):  # the first picture is more urgent
+            self.window.show_icon()
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))

@@ -16,12 +16,17 @@ import imgui_bundle  # noqa: F401
 import glfw
 
 # isort: on
+import numpy as np
+from PIL import Image
+
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.model.state.stereo import Monitor
 
 WINDOW_SIZE = (1280, 800)
 SMALLEST_SIZE = (200, 150)
+ICON_SIZES_PX = (16, 32, 48)
 
 
 class Window:
@@ -52,6 +57,10 @@ class Window:
         self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
         self.held_at: dict[str, tuple[bool, bool]] = {}
+        self._has_icon = glfw.get_platform() not in (
+            glfw.PLATFORM_X11,
+            glfw.PLATFORM_WIN32,
+        )  # elsewhere none can be set
         glfw.set_key_callback(self.handle, self._on_key)  # ImGui's own callback calls it
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
@@ -122,6 +131,20 @@ class Window:
     def set_title(self, title: str) -> None:
         """Write this in the title bar."""
         glfw.set_window_title(self.handle, title)
+
+    def show_icon(self) -> None:
+        """Show the program's icon in the title bar and the list of windows; a second call does nothing.
+
+        The first takes some 50 ms, most of it for loading Pillow's reader of PNG.
+        """
+        if not self._has_icon:
+            folder = resource_folder("assets") / "icon"
+            icons = [
+                (size, size, np.asarray(Image.open(folder / f"iibr-{size}.png", formats=["PNG"])).tolist())
+                for size in ICON_SIZES_PX
+            ]
+            glfw.set_window_icon(self.handle, len(icons), icons)
+            self._has_icon = True
 
     def poll(self, wait_s: float) -> None:
         """Handle events; without any, wait for one at most this long."""

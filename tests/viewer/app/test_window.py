@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import json
+import re
+import subprocess
 from pathlib import Path
 
 import glfw
@@ -39,11 +41,44 @@ def shown_focus(viewer: Driver, given: float) -> float:
     return (given - scene.plan.disparity_zero) * scene.plan.disparity_scale
 
 
+def icon_sizes(driver: Driver) -> list[int]:
+    """Widths of the window's icons: X11 keeps for each its width, its height and its pixels."""
+    window = str(glfw.get_x11_window(driver.app.window.handle))
+    words = [
+        "xprop",
+        "-id",
+        window,
+        "-notype",
+        "-len",
+        "100000",
+        "-f",
+        "_NET_WM_ICON",
+        "32c",
+        " = $0+\n",
+        "_NET_WM_ICON",
+    ]
+    output = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    numbers, sizes = [int(word) for word in re.findall(r"\d+", output)], []
+    while numbers:
+        sizes.append(numbers[0])
+        del numbers[: 2 + numbers[0] * numbers[1]]
+    return sizes
+
+
 def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path)
+    driver.until(lambda app: app.frames_shown > 0)
+    assert icon_sizes(driver) == [], "it would delay the picture"
     driver.until(lambda app: app.scene_view.pictures_drawn > 0)
     assert driver.app.scene_view.renderer.field.present.sum() <= WAITING_VIEWS
     assert driver.image().std() > 10
+    assert icon_sizes(driver) == [16, 32, 48]
+
+
+def test_an_empty_window_has_an_icon(open_window: Opener) -> None:
+    driver = open_window(None)
+    driver.until(lambda app: app.frames_shown > 0)
+    assert icon_sizes(driver) == [16, 32, 48]
 
 
 def test_views_that_the_graphics_card_cannot_hold_are_an_error(
