@@ -164,7 +164,7 @@ EXPORTS = {
     "anaglyph": _stereo("Anaglyph, red-cyan", "anaglyph", path=""),
     "spatial-photo": ExportKind(
         "Spatial photo, HEIC", (".heic",), "stereo:write_spatial", EYES,
-        optics="stereo:optics_of_eyes", purpose="display",
+        optics="stereo:optics_of_eyes", needs=("pillow_heif",), purpose="display",
     ),
     "web": ExportKind(
         "Web page, one file", (".html",), "web:write_page", ("budget", "credit", "target"),

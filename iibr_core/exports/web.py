@@ -16,6 +16,7 @@ from iibr_core.exports.web_streams import can_encode
 from iibr_core.exports.web_views import ViewStore, WebViews, form_that_fits
 from iibr_core.formats.images.metadata import Caption, read_caption
 from iibr_core.formats.outputs import write_file
+from iibr_core.runtime.extras import how_to_install
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
 from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits
@@ -38,10 +39,7 @@ COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
 """Comments and empty lines of a shader."""
 
 
-NO_STREAMS = (
-    " Safari will show the middle view only: streams of all views need PyAV; install it with"
-    " `pip install 'iibr[export]'` and export again."
-)
+NO_STREAMS = " Safari will show the middle view only: streams of all views need PyAV; {}, and export again."
 
 
 def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
@@ -53,7 +51,7 @@ def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
     depth = "" if views.has_disparity else ", without depth"
     return (
         f"{len(views.places)} views of {width}x{height} px{depth} at quality {views.form.quality}:"
-        f" {len(page) / 1e6:.2f} MB.{'' if views.form.is_video else NO_STREAMS}"
+        f" {len(page) / 1e6:.2f} MB.{'' if views.form.is_video else NO_STREAMS.format(how_to_install('export'))}"
     )
 
 

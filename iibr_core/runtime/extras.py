@@ -6,6 +6,9 @@ from importlib.util import find_spec
 
 from iibr_core.types import InputError
 
+LICENCES = {"export": " (PyAV and pillow-heif, which hold encoders under the GPL, x264 and x265)"}
+"""Remarks on the licences of an extra."""
+
 
 def is_installed(package: str) -> bool:
     """Return whether Python finds a package, without importing it."""
@@ -13,7 +16,12 @@ def is_installed(package: str) -> bool:
 
 
 def require_extra(extra: str, *packages: str) -> None:
-    """Raise InputError, with the command that installs them, where packages of an extra are missing."""
+    """Raise InputError, with how to install them, where packages of an extra are missing."""
     missing = [package for package in packages if not is_installed(package)]
     if missing:
-        raise InputError(f"this needs {' and '.join(missing)}; install with: pip install 'iibr[{extra}]'")
+        raise InputError(f"this needs {' and '.join(missing)}; {how_to_install(extra)}")
+
+
+def how_to_install(extra: str) -> str:
+    """Return the command that installs an extra, as a clause of a sentence."""
+    return f"install with: pip install 'iibr[{extra}]'{LICENCES.get(extra, '')}"

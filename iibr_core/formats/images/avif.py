@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL.Image import Image
 
 from iibr_core.formats.files import PARSE_ERRORS, open_binary, require_file
-from iibr_core.formats.images.iso_boxes import associations, box, boxes
+from iibr_core.formats.images.iso_boxes import associations, boxes, meta_boxes, with_primary
 from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow
 
 BRANDS = frozenset({b"avif", b"avis"})
@@ -40,11 +40,9 @@ def avif_depth_file(path: Path) -> bytes | None:
     with open_binary(path) as file:
         data = file.read()
     try:
-        pitm, properties = _primary_and_properties(data)
-        for item, known in properties.items():
+        for item, known in _primary_and_properties(data)[1].items():
             if any(kind == b"auxC" and content[4:].split(b"\0")[0] in DEPTH_TYPES for kind, content in known):
-                shown = pitm[:4] + item.to_bytes(len(pitm) - 4, "big")
-                return data.replace(box(b"pitm", pitm), box(b"pitm", shown), 1)
+                return with_primary(data, item)
     except PARSE_ERRORS:
         pass
     return None
@@ -53,8 +51,8 @@ def avif_depth_file(path: Path) -> bytes | None:
 def _color_codes(data: bytes) -> tuple[int, int, int, int] | None:
     """Return the photo's colours in numbers (ITU-T H.273): primaries, curve, matrix, full range; None without."""
     try:
-        pitm, properties = _primary_and_properties(data)
-        for kind, content in properties[int.from_bytes(pitm[4:], "big")]:
+        primary, properties = _primary_and_properties(data)
+        for kind, content in properties[primary]:
             if kind == b"colr" and content[:4] == b"nclx":
                 primaries, transfer, matrix, full_range = struct.unpack_from(">HHHB", content, 4)
                 return primaries, transfer, matrix, full_range >> 7
@@ -63,12 +61,12 @@ def _color_codes(data: bytes) -> tuple[int, int, int, int] | None:
     return None
 
 
-def _primary_and_properties(data: bytes) -> tuple[bytes, dict[int, list[tuple[bytes, bytes]]]]:
-    """Return the box that names the photo among the items, and the kind and content of each item's properties."""
-    meta = dict(boxes(dict(boxes(data))[b"meta"][4:]))
+def _primary_and_properties(data: bytes) -> tuple[int, dict[int, list[tuple[bytes, bytes]]]]:
+    """Return the number of the photo's item, and the kind and content of each item's properties."""
+    meta = meta_boxes(data)
     iprp = dict(boxes(meta[b"iprp"]))
     properties = list(boxes(iprp[b"ipco"]))
     items, essential = associations(iprp[b"ipma"])
     places = {item: [number % essential for number in numbers] for item, numbers in items.items()}
     known = {item: [properties[k - 1] for k in ks if 1 <= k <= len(properties)] for item, ks in places.items()}
-    return meta[b"pitm"], known
+    return int.from_bytes(meta[b"pitm"][4:], "big"), known

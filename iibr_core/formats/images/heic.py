@@ -1,17 +1,21 @@
 """HEIC photos (HEIF with HEVC), which OpenImageIO's wheel does not read."""
 
+import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, SAVE_ELSEWHERE, open_binary, require_file
+from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, SAVE_ELSEWHERE, open_binary, require_file
+from iibr_core.formats.images.iso_boxes import boxes, meta_boxes, with_primary
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
 from iibr_core.formats.images.pillow_reader import damage_as_input_error, exif_of, facts_of, orientation_in
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
+GROUP_HEADER_BYTES = 12
+"""Size of a group's version, number and count, which precede the numbers of its items."""
 
 
 def is_heic(path: Path) -> bool:
@@ -40,26 +44,24 @@ def heic_size(path: Path, number: int = 0) -> ImageSize:
 def heic_pair(path: Path) -> tuple[int, int] | None:
     """Return the numbers of the left and the right eye's picture (ISO/IEC 23008-12, `ster`); None without such a group.
 
-    A picture's number is its place in the file, except that the photo itself and the first picture are swapped.
+    A picture's number is that of its item; the photo itself has 0.
     """
-    file = _open_file(path)
-    with damage_as_input_error(path):
-        groups = [group for group in file.info.get("entity_groups") or () if group.get("type") == "ster"]
+    try:
+        meta = meta_boxes(_content(path))
+        groups = [content for kind, content in boxes(meta.get(b"grpl", b"")) if kind == b"ster"]
+        items = [item for (item,) in struct.iter_unpack(">I", groups[0][GROUP_HEADER_BYTES:])] if groups else []
+        primary = int.from_bytes(meta[b"pitm"][4:], "big")
+    except PARSE_ERRORS:
+        return None  # whoever decodes the photo says so
     if not groups:
         return None
-    places = [place for place in groups[0].get("images") or () if isinstance(place, int)]
-    if len(places) != 2 or places[0] == places[1] or not all(0 <= place < len(file) for place in places):
+    if len(items) != 2 or items[0] == items[1]:
         raise InputError(
-            f"{path}: its pair is described in an unknown way ({places} of {len(file)} pictures);"
+            f"{path}: its pair is described in an unknown way (by pictures {items});"
             " save both eyes side by side, under a name that ends in '_2x1'"
         )
-    left, right = (_swapped(place, file.primary_index) for place in places)
+    left, right = (0 if item == primary else item for item in items)
     return left, right
-
-
-def _swapped(number: int, primary: int) -> int:
-    """Return the place of a number, or the number of a place: the photo itself has number 0."""
-    return {0: primary, primary: 0}.get(number, number)
 
 
 def read_heic_depth(path: Path) -> tuple[FloatImage, dict[str, Any]] | None:
@@ -79,7 +81,7 @@ def read_heic_depth(path: Path) -> tuple[FloatImage, dict[str, Any]] | None:
 
 
 def heic_info(path: Path) -> dict[str, Any]:
-    """Return pillow-heif's description of a HEIC's photo."""
+    """Return pi-heif's description of a HEIC's photo."""
     return dict(_open(path).info)
 
 
@@ -93,27 +95,27 @@ def heic_auxiliaries(path: Path) -> tuple[str, ...]:
     return tuple(str(kind) for kind in heic_info(path).get("aux") or {})
 
 
-def _open_file(path: Path) -> Any:
-    import pillow_heif
+def _open(path: Path, number: int = 0) -> Any:
+    import pi_heif
 
     require_file(path)
     with damage_as_input_error(path):
-        file = pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
+        content = with_primary(_content(path), number) if number else path
+        file = pi_heif.open_heif(content, convert_hdr_to_8bit=False)
     if not len(file):
         raise InputError(f"{path}: holds no picture of a known codec; {SAVE_ELSEWHERE}")
+    with damage_as_input_error(path):
+        width, height = file.size
+    require_sound_size(path, width, height, width * height * 4)
     return file
 
 
-def _open(path: Path, number: int = 0) -> Any:
-    file = _open_file(path)
-    with damage_as_input_error(path):
-        picture = file[_swapped(number, file.primary_index)] if number else file
-        width, height = picture.size
-    require_sound_size(path, width, height, width * height * 4)
-    return picture
+def _content(path: Path) -> bytes:
+    with open_binary(path) as file:
+        return file.read()
 
 
 def _pixels(path: Path, picture: Any) -> NDArray[Any]:
     with damage_as_input_error(path):
-        pixels = np.array(picture)  # a copy: pillow-heif 1.0's own array does not outlive the file
+        pixels = np.array(picture)  # a copy: its own array does not outlive the file
     return pixels.reshape(*pixels.shape[:2], -1)

@@ -29,6 +29,18 @@ def joined(contents: dict[bytes, bytes]) -> bytes:
     return b"".join(box(kind, content) for kind, content in contents.items())
 
 
+def meta_boxes(file: bytes) -> dict[bytes, bytes]:
+    """Return the boxes that describe a file's items by their kinds. Raises KeyError where the file has none."""
+    return dict(boxes(dict(boxes(file))[b"meta"][4:]))
+
+
+def with_primary(file: bytes, item: int) -> bytes:
+    """Return a file that shows this item as its photo. Raises KeyError and OverflowError where it cannot."""
+    primary = meta_boxes(file)[b"pitm"]
+    shown = primary[:4] + item.to_bytes(len(primary) - 4, "big")
+    return file.replace(box(b"pitm", primary), box(b"pitm", shown), 1)
+
+
 def associations(ipma: bytes) -> tuple[dict[int, list[int]], int]:
     """Return the numbers of each item's properties, counted from 1, and the bit that marks essential ones.
 

@@ -19,6 +19,7 @@ from PIL import Image
 from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, decoding_fault, open_binary, printable, reason_of
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import open_with_pillow
+from iibr_core.runtime.extras import how_to_install
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 LFP_START = b"\x89LFP\r\n\x1a\n"
@@ -200,7 +201,7 @@ def _film(path: Path, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
     try:
         import av
     except ImportError as error:
-        raise InputError(f"{path}: its pictures are H.264; install PyAV with `pip install 'iibr[export]'`") from error
+        raise InputError(f"{path}: its pictures are H.264; {how_to_install('export')}") from error
     frames: dict[int, NDArray[np.uint8]] = {}
     try:
         with av.open(BytesIO(pictures.files[0]), mode="r", format="h264") as film:

@@ -21,7 +21,7 @@ EXIF_FOLDER, ORIENTATION_TAG = 0x8769, 0x0112
 COLOR_CODES = "color_primaries", "transfer_characteristics", "matrix_coefficients", "full_range_flag"
 """Keys of Pillow's `nclx_profile`, in the order of `Picture.codes`."""
 DECODE_ERRORS = (*PARSE_ERRORS, Image.DecompressionBombError)
-"""Errors that Pillow and pillow-heif raise for damaged files."""
+"""Errors that Pillow and pi-heif raise for damaged files."""
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def open_with_pillow(path: Path, formats: tuple[str, ...], data: bytes | None = 
 
 @contextmanager
 def damage_as_input_error(path: Path) -> Iterator[None]:
-    """Raise InputError for errors of Pillow and pillow-heif in the block."""
+    """Raise InputError for errors of Pillow and pi-heif in the block."""
     try:
         yield
     except InputError:
@@ -76,7 +76,7 @@ def exif_of(data: bytes | None) -> Image.Exif:
 
 
 def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
-    """Return focal length and colours for `Picture`, from what Pillow and pillow-heif call info.
+    """Return focal length and colours for `Picture`, from what Pillow and pi-heif call info.
 
     A profile counts more than colours in numbers, except for the curves of HDR.
     """

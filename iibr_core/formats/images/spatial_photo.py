@@ -16,7 +16,7 @@ from PIL import Image
 
 from iibr_core.formats.animations import require_even
 from iibr_core.formats.files import PARSE_ERRORS, reason_of
-from iibr_core.formats.images.iso_boxes import associations, box, boxes, joined
+from iibr_core.formats.images.iso_boxes import associations, box, boxes, joined, meta_boxes
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError, image_size
 
@@ -56,7 +56,7 @@ def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.u
 def _with_pair(file: bytes, focal: float) -> bytes:
     """Return a HEIC file with the boxes of a pair. focal: focal length as a share of the width."""
     top = dict(boxes(file))
-    head, meta = top[b"meta"][:4], dict(boxes(top[b"meta"][4:]))
+    head, meta = top[b"meta"][:4], meta_boxes(file)
     iprp = dict(boxes(meta[b"iprp"]))
     entries, _ = associations(iprp[b"ipma"])
     left, right = entries

@@ -10,6 +10,8 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.embedded.embedded import read_embedded
+from iibr_core.formats.images.heic import heic_pair
+from iibr_core.formats.images.iso_boxes import with_primary
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
@@ -163,6 +165,25 @@ def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path, kind) -> N
         assert np.abs(views[at].astype(int) - expected).mean() < 3
     photo = read_photo(path)
     np.testing.assert_allclose(photo.pixels * 255, views[0, 0], atol=0.51)
+
+
+def test_a_spatial_photo_may_show_its_right_picture(tmp_path) -> None:
+    path, left, right = tmp_path / "a.heic", smooth(), smooth(shift=4)
+    write_spatial_photo(path, left, right, 80.0)
+    path.write_bytes(with_primary(path.read_bytes(), heic_pair(path)[1]))
+    views = read_back(path)
+    assert np.abs(views[0, 0].astype(int) - left).mean() < 3
+    assert np.abs(views[0, 1].astype(int) - right).mean() < 3
+
+
+@pytest.mark.parametrize("items", [(1, 77), (1, 1)])
+def test_a_pair_of_unknown_pictures_is_refused(tmp_path, items) -> None:
+    path = tmp_path / "a.heic"
+    write_spatial_photo(path, smooth(), smooth(shift=4), 80.0)
+    pair, damaged = (struct.pack(">III", 2, *numbers) for numbers in ((1, 2), items))
+    path.write_bytes(path.read_bytes().replace(pair, damaged))
+    with pytest.raises(InputError, match=r"a\.heic.*(unknown way \(by pictures \[1, 1\]\)|non-existing image)"):
+        read_back(path)
 
 
 def test_jpegs_with_other_pictures_are_no_stereo(tmp_path) -> None:

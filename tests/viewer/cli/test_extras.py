@@ -7,25 +7,48 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pillow_heif
 import pytest
+from PIL import Image
 
 from tests.viewer.cli.conftest import Iibr, contents, output_of, refusal_of
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = (
-    "torch", "transformers", "scipy", "skimage", "jinja2", "flip_evaluator", "matplotlib", "cv2", "distributed",
+    "torch", "transformers", "scipy", "skimage", "jinja2", "flip_evaluator", "matplotlib", "cv2", "distributed", "av",
+    "pillow_heif",
 )  # fmt: skip
 
 
-def run_plain(*words: object) -> subprocess.CompletedProcess[str]:
-    """Run `iibr` in a process of its own in which these packages cannot be imported."""
-    code = f"import sys; sys.modules.update(dict.fromkeys({EXTRAS!r})); from viewer.entry import command; command()"
-    command = [sys.executable, "-P", "-c", code, *map(str, words)]
+RUN = """
+import sys
+sys.modules.update(dict.fromkeys({extras!r}))
+from viewer.entry import run
+for sys.argv[1:] in {commands!r}:
+    if code := run():
+        sys.exit(code)
+"""
+
+
+def run_plain(*commands: list[str]) -> subprocess.CompletedProcess[str]:
+    """Run `iibr` with these words, in a process of its own in which packages of extras cannot be imported."""
+    command = [sys.executable, "-P", "-c", RUN.format(extras=EXTRAS, commands=commands)]
     return subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
 
 
 def test_viewing_needs_no_extra(photo_path: Path, tmp_path: Path) -> None:
-    output_of(run_plain("screenshot", photo_path, "--view", "1,0", "--size", "96x64", "-o", tmp_path / "picture.png"))
+    output = str(tmp_path / "picture.png")
+    output_of(run_plain(["screenshot", str(photo_path), "--view", "1,0", "--size", "96x64", "-o", output]))
+
+
+def test_heic_photos_become_loops_and_pages_without_gpl_encoders(tmp_path: Path) -> None:
+    photo, exports = str(tmp_path / "photo.heic"), {kind: tmp_path / f"a.{kind}" for kind in ("gif", "webp")}
+    exports["web"] = tmp_path / "a.html"
+    pillow_heif.from_pillow(Image.radial_gradient("L").resize((96, 64)).convert("RGB")).save(photo)
+    np.save(tmp_path / "photo_disparity.npy", np.linspace(-1, 1, 96 * 64, dtype=np.float32).reshape(64, 96))
+    output_of(run_plain(*(["export", photo, "--to", kind, "-o", str(path)] for kind, path in exports.items())))
+    assert all(path.stat().st_size > 1000 for path in exports.values())
 
 
 @pytest.mark.parametrize(
@@ -34,6 +57,9 @@ def test_viewing_needs_no_extra(photo_path: Path, tmp_path: Path) -> None:
         ("train --steps 1 -o w.safetensors", "torch; install with: pip install 'iibr[train]'"),
         ("evaluate . -o report", "flip_evaluator; install with: pip install 'iibr[evaluate]'"),
         ("batch . --to depth -o out --dask tcp://127.0.0.1:1", "pip install 'iibr[batch]'"),
+        ("export scene.png --to mp4 -o a.mp4", "av; install with: pip install 'iibr[export]' (PyAV and pillow-heif"),
+        ("export scene.png --to spatial-photo -o a.heic", "this needs pillow_heif; install with: pip install"),
+        ("export scene.png --to webm -o a.webm", "encoders under the GPL, x264 and x265"),
         ("plan scene.png --depth-model depth-pro", "pip install 'iibr[depth]'"),
     ],
 )
