@@ -2,6 +2,7 @@
 # Both set up what they need, and no more: the environment in .venv, and system GL libraries where that is allowed.
 
 PYTHON ?= python3
+PYTHONS ?= python3.11 python3.12 python3.13
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
@@ -10,7 +11,7 @@ READY_TESTS := $(VENV)/.ready-tests
 KERNELS := $(VENV)/.kernels
 HEADSET := tests/web/node_modules
 
-.PHONY: run test bench figures fuzz site install kernels wheel clean
+.PHONY: run test bench figures fuzz site install kernels dist clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
@@ -75,9 +76,20 @@ $(KERNELS): $(READY) $(shell find iibr_core viewer -name '*.py')
 	$(BIN)/python -P -m viewer.precompile iibr_core/_kernels
 	@touch $@
 
-# dist/iibr-*.whl, with its kernels compiled by the versions in constraints.txt.
-wheel: $(READY)
-	$(BIN)/python -m pip wheel --quiet --no-deps -c constraints.txt --wheel-dir dist .
+# dist/: the source package, and from it a wheel without kernels, for all systems, and a wheel with kernels for each of PYTHONS.
+dist: install
+	rm -f dist/iibr-*.whl dist/iibr-*.tar.gz
+	$(BIN)/python -m hatchling build -t sdist -d dist
+	HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist dist/iibr-*.tar.gz
+	@for python in $(PYTHONS); do \
+		if $$python --version >/dev/null 2>&1; then \
+			echo "compiling kernels for $$python, some minutes"; \
+			$(BIN)/python -m pip --python "$$(command -v $$python)" wheel --quiet --no-deps --wheel-dir dist dist/iibr-*.tar.gz || exit 1; \
+		else \
+			echo "no $$python here: no wheel with kernels for it"; \
+		fi; \
+	done
+	$(BIN)/python -m twine check --strict dist/iibr-*
 
 clean:
 	rm -rf $(VENV) $(HEADSET) out dist iibr_core/_kernels

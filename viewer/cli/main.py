@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,6 +20,7 @@ from viewer.cli.models import models
 from viewer.cli.plan import plan
 from viewer.cli.screenshot import screenshot
 from viewer.cli.train import train
+from viewer.cli.version import print_version
 from viewer.cli.view import demo, open_last_scene, view
 
 FORMER_NAMES = {"--out": "--output"}
@@ -65,18 +65,12 @@ for command in (view, export, screenshot, generate, depth, batch, plan, demo, ev
 app.add_typer(models, name="models")
 
 
-def print_version(is_wanted: bool) -> None:
-    """Print the version and end the program if that is wanted."""
-    if is_wanted:
-        print(f"iibr {version('iibr')}")
-        raise typer.Exit
-
-
 @app.callback()
 def iibr(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", metavar="", callback=print_version, is_eager=True, help="Show the version.")
+        bool,
+        typer.Option("--version", metavar="", callback=print_version, is_eager=True, help="Show versions and commit."),
     ] = False,
 ) -> None:
     """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture.

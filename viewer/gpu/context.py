@@ -20,8 +20,8 @@ SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader", "swr", "s
 class GLContext:
     """A GL context and its limits.
 
-    ctx: the moderngl context. backend: "window", "egl", "osmesa" or "system". renderer: name that the driver reports.
-    max_texture_size: largest side of a texture in pixels.
+    ctx: the moderngl context. backend: "window", "egl", "osmesa" or "system". renderer, version: as the driver
+    reports them. max_texture_size: largest side of a texture in pixels.
     """
 
     def __init__(self, ctx: moderngl.Context, backend: str, close: Callable[[], None] = lambda: None) -> None:
@@ -29,6 +29,7 @@ class GLContext:
         self.ctx: Any = ctx
         self.backend = backend
         self.renderer: str = ctx.info["GL_RENDERER"]
+        self.version: str = ctx.info["GL_VERSION"]
         self.max_texture_size: int = ctx.info["GL_MAX_TEXTURE_SIZE"]
         self._close = close
 

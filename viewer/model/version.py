@@ -1,0 +1,30 @@
+"""The version and the commit of the program, as a person reports them."""
+
+from __future__ import annotations
+
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[1]
+COMMIT_FILE = PACKAGE / "_commit.txt"
+"""File that a packaged copy has (`.ci/hatch_build.py`); a checkout asks git."""
+UNKNOWN = "unknown"
+
+
+def program_version() -> str:
+    """Return the version, which only `pyproject.toml` states."""
+    return version("iibr")
+
+
+def program_commit() -> str:
+    """Return the commit, with `-dirty` after it where a checkout differs from it; "unknown" without git."""
+    if COMMIT_FILE.is_file():
+        return COMMIT_FILE.read_text("utf-8").strip()
+    if not (PACKAGE.parent / ".git").exists():
+        return UNKNOWN
+    command = ("git", "-C", PACKAGE.parent, "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*")
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return UNKNOWN
