@@ -16,7 +16,7 @@ from platformdirs import user_cache_path
 
 from iibr_core.formats.outputs import make_folder, write_file
 from iibr_core.types import InputError
-from viewer.model.saving import PASTED_FOLDER
+from viewer.model.demo_photo import PASTED_FOLDER
 
 MAX_PASTED = 20
 """Number of pasted pictures that are kept."""

@@ -57,7 +57,8 @@ def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:
     """Open the dialog for a file or folder, in the folder that holds `beside`."""
     from imgui_bundle import portable_file_dialogs as dialogs
 
-    start = os.path.join(os.path.dirname(os.path.abspath(beside)), "") if beside else ""
+    folder = os.path.dirname(os.path.abspath(os.path.expanduser(beside)))
+    start = os.path.join(folder, "") if beside else ""
     title, endings = CHOICES[what][0], CHOICES[what][1].split()
     if not endings:
         return Dialog(what, dialogs.select_folder(title, start))

@@ -25,18 +25,21 @@ from viewer.app.stereo_screen import StereoScreen
 from viewer.app.window import Window
 from viewer.background.maps import EntropyWork, GlossFinder, find_surface
 from viewer.background.newest import Newest
+from viewer.background.receiver import Receiver
 from viewer.background.tracker import Tracker
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.context import create_for_window
 from viewer.model import gesture, inspection, opening, preferences, saving, viewpoint, window
-from viewer.model.action import Action, do
+from viewer.model.action import Action, ask, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES
 from viewer.model.layout import Layout, is_narrow
 from viewer.model.state.app_state import AppState, Picture
+from viewer.model.state.tasks import PlainTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
+from viewer.ui.overlays.welcome import recent_paths
 from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
 
@@ -70,6 +73,7 @@ class App:
         self._entropy = Newest("iibr-entropy", EntropyWork(), self.window.wake)
         self._surfaces = Newest("iibr-surface", find_surface, self.window.wake)
         self._tracker = Tracker(self.window.wake)
+        self.receiver = Receiver(self.window.wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, self.window.wake)
         self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, self.window.wake)
@@ -81,6 +85,7 @@ class App:
         self._pointer = NO_POINTER
         self._pace = Pace()
         self._drawn_at = 0.0
+        self.do(do(ask, PlainTask("find recent")))
 
     def run(self) -> None:
         """Show frames until the user quits."""
@@ -107,7 +112,7 @@ class App:
         if pointer.step_x or pointer.step_y:
             self._pace.pointer_moved_at = time.perf_counter()
         actions = [do(gesture.end_gesture)] if pointer.is_pressed and self.state.history.gesture else []
-        thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
+        thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout) + recent_paths(self.state))
         sharp = self.sharpener.texture(picture) if picture else None
         texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
         woven = self.stereo_screen.texture
@@ -174,6 +179,7 @@ class App:
         self._entropy.close()
         self._surfaces.close()
         self._tracker.close()
+        self.receiver.close()
         self.gloss_finder.close()
         self._preferences.keep(self.state, is_closing=True)
         self._sessions.close(self.state)
@@ -212,6 +218,9 @@ class App:
         actions += self._tracker.advance(self.state)
         actions += self.stereo_screen.follow(self.state)
         actions += self._place_window() + actions_from_drop(self.window.take_dropped(), self.state)
+        if (received := self.receiver.take()) is not None:
+            self.window.ask_for_attention()
+            actions += actions_from_drop(received, self.state)
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(do(window.set_narrow, not self.state.is_narrow))
         return actions
@@ -259,6 +268,7 @@ class App:
 def run(state: AppState, kept_in: Path | None = None, *actions: Action) -> None:
     """Open the window on this state, take actions, and show it until the user quits. Raises InputError."""
     with closing(App(state, kept_in)) as app:
+        app.receiver.listen()
         app.do(*actions)
         app.run()
 

@@ -24,6 +24,7 @@ from viewer.display.scene_view import SceneView
 from viewer.model import depth_models, folder, lens, messages, opening, stereo
 from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
+from viewer.model.demo_photo import is_ours
 from viewer.model.opening import set_facts
 from viewer.model.saving import path_beside
 from viewer.model.state import tasks
@@ -83,8 +84,7 @@ class SideEffects:
             case tasks.ChooseTask(what) if not has_dialogs():
                 return [do(messages.show_prompt, PathPrompt(what, _folder_beside(state)))]
             case tasks.ChooseTask(what):
-                beside = state.source.path if state.source else next(iter(state.recent), "")
-                self._dialog = self._dialog or ask_for_path(what, beside)
+                self._dialog = self._dialog or ask_for_path(what, _folder_beside(state))
             case tasks.TakePathTask(prompt):
                 return _take_path(prompt, state)
             case tasks.ChoosePlaceTask(prompt):
@@ -94,6 +94,8 @@ class SideEffects:
                 self._submit(partial(_read_mask, self._masks[-1]))
             case tasks.PlainTask("read facts", path):
                 self._submit(partial(_read_facts, path))
+            case tasks.PlainTask("find recent"):
+                self._submit(lambda: do(opening.set_existing_recent, tuple(filter(os.path.exists, state.recent))))
             case tasks.PlainTask("list folder", path):
                 self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
             case tasks.SaveTask():
@@ -158,8 +160,11 @@ def _take_path(prompt: PathPrompt, state: AppState) -> list[Action]:
 
 
 def _folder_beside(state: AppState) -> str:
-    """Return the folder of the open photo, with a separator at its end."""
-    path = state.source.path if state.source is not None else next(iter(state.recent), "~/photo")
+    """Return the folder of the open photo, or the one used last, with a separator at its end."""
+    source, last = state.source, state.preferences.opened_folder
+    if last and (source is None or is_ours(source.path)):
+        return os.path.join(last, "")
+    path = source.path if source is not None else next(iter(state.recent), "~/photo")
     return os.path.join(os.path.dirname(path_beside(path, "photo")), "")
 
 

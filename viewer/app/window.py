@@ -203,6 +203,13 @@ class Window:
         glfw.make_context_current(self.handle)
         glfw.swap_interval(int(is_wanted))
 
+    def ask_for_attention(self) -> None:
+        """Bring the window to the front, as far as the system allows that."""
+        if self.is_hidden:
+            glfw.restore_window(self.handle)
+        glfw.focus_window(self.handle)
+        glfw.request_window_attention(self.handle)
+
     def hide(self) -> None:
         """Hide the window."""
         glfw.hide_window(self.handle)

@@ -17,6 +17,7 @@ from viewer.cli.export import export
 from viewer.cli.generate import generate
 from viewer.cli.messages import print_notes
 from viewer.cli.models import models
+from viewer.cli.open import open_photos
 from viewer.cli.plan import plan
 from viewer.cli.screenshot import screenshot
 from viewer.cli.train import train
@@ -62,6 +63,7 @@ app = typer.Typer(
 )
 for command in (view, export, screenshot, generate, depth, batch, plan, demo, evaluate, train):
     app.command()(command)
+app.command("open")(open_photos)
 app.add_typer(models, name="models")
 
 

@@ -5,6 +5,7 @@ Each request has a generation. Results of an earlier generation change nothing.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
@@ -14,6 +15,7 @@ from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
 from iibr_core.types import InputError
 from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, with_focus_of
+from viewer.model.demo_photo import is_ours
 from viewer.model.history import map_optics, undoable
 from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.remedies import DEPTH_COMMANDS
@@ -148,6 +150,11 @@ def with_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
     return (path, *(other for other in recent if other != path))[:MAX_RECENT]
 
 
+def set_existing_recent(state: AppState, paths: tuple[str, ...]) -> AppState:
+    """Offer those recent files that exist."""
+    return replace(state, existing_recent=paths)
+
+
 def other_recent(state: AppState) -> tuple[str, ...]:
     """Return the recent paths other than the open one."""
     return tuple(path for path in state.recent if state.source is None or path != state.source.path)
@@ -168,6 +175,8 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
     recent, folder = state.recent, str(PurePath(scene.source.path).parent)
     if old is not None and state.folder is not None and state.folder.is_stepped_to(scene.source):
         recent = tuple(path for path in recent if path != old.source.path)  # a walk through a folder leaves one path
+    if not is_ours(scene.source.path):
+        state = replace(state, preferences=replace(state.preferences, opened_folder=os.path.abspath(folder)))
     state = replace(
         state,
         notices=tuple(notice for notice in state.notices if notice.is_result),

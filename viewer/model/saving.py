@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path, PurePath
 
 from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
-from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
+from viewer.model.demo_photo import is_ours
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -19,8 +19,6 @@ from viewer.model.state.saving import SavedSettings
 MAX_FINISHED = 8
 """Number of finished exports in the list."""
 NO_NAME = "There is no name yet. Type one, or press Browse…"
-PASTED_FOLDER = "pasted"
-"""Name of the folder that keeps pasted pictures for a while; nothing else is saved there."""
 
 
 def ask_to_save(state: AppState, what: Saved = "picture") -> AppState:
@@ -149,8 +147,7 @@ def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOpti
 def path_beside(path: str, name: str) -> str:
     """Return a path beside a photo; in the home folder for a pasted photo and for the demo."""
     folder = PurePath(path).parent
-    is_ours = folder.name == PASTED_FOLDER or folder.is_relative_to(resource_folder("assets"))
-    return str((PurePath("~") if is_ours else folder) / name)
+    return str((PurePath("~") if is_ours(path) else folder) / name)
 
 
 def _map_path(state: AppState, scene: Scene) -> str:

@@ -28,6 +28,21 @@ def test_an_empty_window_offers_to_open_a_photo_and_to_see_the_demo(
     assert driver.app.state.scene.name == "motorcycle"
 
 
+def test_a_click_opens_a_recent_photo_and_photos_that_are_gone_are_not_shown(
+    open_window: Opener, photo_path: Path, tmp_path: Path
+) -> None:
+    gone = str(tmp_path / "gone.png")
+    store_preferences(AppState(recent=(gone, str(photo_path))), tmp_path / "kept")
+    driver = open_window(None, kept_in=tmp_path / "kept")
+    driver.until(lambda app: app.state.existing_recent == (str(photo_path),))
+    driver.press(f"photo {photo_path}", "welcome")
+    driver.until(lambda app: app.state.scene is not None)
+    assert driver.app.state.scene is not None
+    assert driver.app.state.scene.name == "scene"
+    assert driver.app.state.preferences.opened_folder == str(photo_path.parent)
+    assert driver.app.state.recent == (str(photo_path), gone), "its disk may be back the next time"
+
+
 @pytest.mark.parametrize(
     ("recent", "title"), [(("scene.png",), "^scene - iibr$"), (("gone.png", "scene.png"), "^iibr$")]
 )

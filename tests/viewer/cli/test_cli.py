@@ -29,7 +29,7 @@ from viewer.cli.main import app
 from viewer.cli.options import grid_from_text, number_from_text, size_from_text, view_from_text
 
 ROOT = Path(__file__).parents[3]
-COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands if command.callback]
 
 
 def run_apart(code: str, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -29,7 +29,7 @@ from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import ExportPrompt, JobProgress, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, Look, apply_style, palette_of
 
-WINDOW = ScreenSize(1280, 800)
+WINDOW, SMALL_WINDOW = ScreenSize(1280, 800), ScreenSize(400, 300)
 LEAST_CONTRAST = 4.5
 LEAST_HOVER_CONTRAST = 1.5
 SCALES = (0.6, 1.0, 2.0)
@@ -117,12 +117,13 @@ PROMPTS: dict[str, Prompt] = {
     "export": ExportPrompt("mp4", "a.mp4"),
     "models": ModelsPrompt(),
 }
-WELCOME = "welcome"
+WELCOME, SMALL = "welcome", "welcome in a small window"
 """No prompt, but alike: what an empty window says."""
+RECENT = "/photos/a.jpg", "/photos/one with a long name that does not fit into one line.jpg", "/photos/b.jpg"
 
 
 @pytest.mark.parametrize("scale", [0.6, 2.0])
-@pytest.mark.parametrize("name", [*PROMPTS, WELCOME])
+@pytest.mark.parametrize("name", [*PROMPTS, WELCOME, SMALL])
 def test_prompts_fit_the_window_and_their_words_fit_them(
     viewer: OffscreenScene, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
 ) -> None:
@@ -140,16 +141,17 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
         jobs = JobProgress(1, "export", "a.mp4", "drawing frames", 0.5), JobProgress(2, "picture", "b.png")
         edited = DepthSettings(edits=DepthEdits(gamma=1.5))
         viewer.state = replace(viewer.state, jobs=jobs, depth=edited)
-    if name == WELCOME:
-        viewer.state = AppState()
+    if name in (WELCOME, SMALL):
+        viewer.state = AppState(recent=RECENT, existing_recent=RECENT)
     viewer.do(
         do(preferences.set_font_scale, scale),
         do(depth_models.set_known, list_models()),
         do(messages.show_prompt, PROMPTS.get(name)),
     )
-    viewer.screen(WINDOW)
+    window = SMALL_WINDOW if name == SMALL else WINDOW
+    viewer.screen(window)
     left, top, right, bottom, hidden = ended[-1]
-    assert (left >= 0, top >= 0, right <= WINDOW.width, bottom <= WINDOW.height) == (True,) * 4, ended[-1]
+    assert (left >= 0, top >= 0, right <= window.width, bottom <= window.height) == (True,) * 4, ended[-1]
     assert hidden == 0, "cut at the right"
     within = [item for item in items if left <= item.left < right and top <= item.top < bottom]
     assert within

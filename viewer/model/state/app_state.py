@@ -73,7 +73,8 @@ class AppState:
 
     source was asked for last, scene is open; generation numbers the requests, shown_generation is that of the scene.
     views_there: (row, column) of views that were made. stopped: generation that the user stopped. tilt_handles: None
-    while hidden. recent: paths, the latest first. report: None without a window. zoom: None for the whole picture.
+    while hidden. recent: paths, the latest first; existing_recent: those that were found on disk. report: None without
+    a window. zoom: None for the whole picture.
     free_camera: None in the plane of the views; free_progress: share of its preparation, None once done. depth:
     refinement and edits; stroke: of the brush while it is drawn. chosen_focus: disparity that the user chose for this
     scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
@@ -100,6 +101,7 @@ class AppState:
     tasks: tuple[Task, ...] = ()
     preferences: Preferences = field(default_factory=Preferences)
     recent: tuple[str, ...] = ()
+    existing_recent: tuple[str, ...] = ()
     report: DrawReport | None = None
     inspection: Inspection = field(default_factory=Inspection)
     zoom: Zoom | None = None

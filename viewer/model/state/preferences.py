@@ -46,7 +46,8 @@ class Preferences:
     """Preferences, which outlast the program.
 
     window: x, y, width, height in screen units, None before the first one; is_maximized: whether it filled the screen.
-    last_folder: of the last saved or exported file, "" before the first. estimates_depth: whether photos without depth
+    last_folder: of the last saved or exported file, "" before the first; opened_folder: of the last opened photo.
+    estimates_depth: whether photos without depth
     get it from the recommended model once that is downloaded. tracker: address of the tracker of the head.
     head_range_cm: movement of the head from the middle to the outermost views. stereo_monitor: chosen
     last; None for any.
@@ -62,6 +63,7 @@ class Preferences:
     units: Units = "photographic"
     estimates_depth: bool = False
     last_folder: str = ""
+    opened_folder: str = ""
     tracker: str = "udp:127.0.0.1:4242"
     head_range_cm: float = 15.0
     stereo_mode: StereoMode = "half-sbs"

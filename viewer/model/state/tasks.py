@@ -8,8 +8,8 @@ from typing import Literal
 from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PathPrompt, SavePrompt
 
 PlainKind = Literal[
-    "copy", "paste", "find display", "read mask", "list folder", "read facts", "list models", "download model",
-    "stop download",
+    "copy", "paste", "find display", "read mask", "list folder", "read facts", "find recent", "list models",
+    "download model", "stop download",
 ]  # fmt: skip
 
 
@@ -19,7 +19,8 @@ class PlainTask:
 
     copy: put the picture, at the size of the views, into the system's clipboard. paste: open the picture that is there,
     or the path of one. find display: show the scene on the one that Looking Glass Bridge knows. read facts: those
-    that a photo's file states. A stopped download is continued by the next one.
+    that a photo's file states. find recent: look which recent files exist. A stopped
+    download is continued by the next one.
     """
 
     kind: PlainKind

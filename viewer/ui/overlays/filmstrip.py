@@ -54,10 +54,10 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
         name = photos.photos[i].name
         path = str(PurePath(photos.path) / name)
         thumbnail, is_readable = thumbnails.get(path), name not in photos.unreadable
-        if _photo(cell, name, thumbnail, i == place, palette) and place is not None and is_readable:
+        if photo_cell(cell, name, thumbnail, palette, i == place) and place is not None and is_readable:
             actions.append(do(folder.step, i - place))
         if thumbnail is None and (path in thumbnails or not is_readable):
-            _write(cell, f"Cannot be read: {name}", palette)
+            write_in_cell(cell, f"Cannot be read: {name}", palette)
     if imgui.is_window_hovered() and (wheel := imgui.get_io().mouse_wheel):
         actions.append(do(folder.scroll, -round(wheel) or (-1 if wheel > 0 else 1)))
     imgui.end()
@@ -83,7 +83,7 @@ def _count(rect: Rect, layout: Layout) -> int:
     return int((rect.width - gap) // (width + gap))
 
 
-def _write(cell: Rect, words: str, palette: Palette) -> None:
+def write_in_cell(cell: Rect, words: str, palette: Palette) -> None:
     """Draw words in a cell, as far as they fit."""
     size = WORDS_SIZE * imgui.get_font_size()
     corner, width = imgui.ImVec2(cell.x + size / 3, cell.y + size / 3), cell.width - size * 2 / 3
@@ -92,12 +92,14 @@ def _write(cell: Rect, words: str, palette: Palette) -> None:
     draw.add_text(imgui.get_font(), size, corner, color, words, width, ends)
 
 
-def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, palette: Palette) -> bool:
-    """Draw a photo as large as it fits; return whether it was clicked."""
+def photo_cell(
+    cell: Rect, name: str, thumbnail: Thumbnail | None, palette: Palette, is_open: bool = False, tip: str = ""
+) -> bool:
+    """Draw a photo as large as it fits; return whether it was clicked. tip: its tooltip, the name if there is none."""
     draw, rounding = imgui.get_window_draw_list(), 3 * scale()
     corner, far = corners(cell)
     imgui.set_cursor_screen_pos(corner)
-    is_pressed = imgui.invisible_button(f"photo {name}", imgui.ImVec2(cell.width, cell.height))
+    is_pressed = imgui.invisible_button(f"photo {tip or name}", imgui.ImVec2(cell.width, cell.height))
     draw.add_rect_filled(corner, far, pack_color(palette.frame), rounding)
     if thumbnail is not None:
         width = min(cell.width, cell.height * thumbnail.aspect)
@@ -107,5 +109,5 @@ def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, pa
     if is_open or imgui.is_item_hovered():
         color = pack_color(palette.accent if is_open else palette.quiet)
         draw.add_rect(corner, far, color, rounding, rounding if is_open else rounding / 2)
-    tooltip(name)
+    tooltip(tip or name)
     return bool(is_pressed)

@@ -1,0 +1,135 @@
+"""Paths handed over to the open window: the first window listens, and nothing that any program sends disturbs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import struct
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from viewer.background.receiver import Receiver
+from viewer.cli.open import hand_over
+from viewer.model.handover import MAX_BYTES, MAX_PATHS, window_address
+
+DEADLINE_S = 30.0
+SHORT = struct.Struct("!i")
+"""Length before each message."""
+
+
+@pytest.fixture(autouse=True)
+def runtime_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with a short name: the system limits the length of a socket's path."""
+    with tempfile.TemporaryDirectory() as folder:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        monkeypatch.setenv("DISPLAY", ":77")
+        yield Path(folder)
+
+
+@pytest.fixture
+def receiver() -> Iterator[Receiver]:
+    listening = Receiver(lambda: None)
+    listening.listen()
+    yield listening
+    listening.close()
+
+
+def hand_over_when_heard(*paths: str) -> None:
+    """A thread takes its time to begin to listen."""
+    end = time.monotonic() + DEADLINE_S
+    while not hand_over(list(paths)):
+        assert time.monotonic() < end
+
+
+def test_the_latest_paths_are_received_once(receiver: Receiver) -> None:
+    assert receiver.take() is None
+    hand_over_when_heard("/photos/a.png")
+    hand_over_when_heard("/photos/ä.png", "/photos/\udcff.png")
+    assert receiver.take() == ("/photos/ä.png", "/photos/\udcff.png")
+    assert receiver.take() is None
+    hand_over_when_heard()
+    assert receiver.take() == (), "a start without paths brings the window to the front"
+
+
+def test_one_of_two_windows_listens_and_another_one_after_it_although_a_killed_one_left_its_socket() -> None:
+    address = window_address()
+    assert address is not None
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(address)
+    windows = [Receiver(lambda: None), Receiver(lambda: None)]
+    for window in windows:
+        window.listen()
+    hand_over_when_heard("/a.png")
+    took = [window.take() for window in windows]
+    assert sorted(took, key=str) == [("/a.png",), None]
+    for window in windows:
+        window.close()
+    assert not hand_over(["/b.png"])
+    again = Receiver(lambda: None)
+    again.listen()
+    hand_over_when_heard("/b.png")
+    assert again.take() == ("/b.png",)
+    again.close()
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"",
+        b"GET / HTTP/1.1\r\n\r\n",
+        SHORT.pack(100) + b"half",
+        SHORT.pack(MAX_BYTES + 1),
+        *(
+            SHORT.pack(len(text)) + text
+            for text in (
+                b"\x80\x04N.",
+                b"[" * 100_000,
+                b'{"/a.png": 1}',
+                b'["a.png"]',
+                b"[[]]",
+                b'["/\\ud800"]',
+                b'["/\\u0000"]',
+                json.dumps(["/a.png"] * (MAX_PATHS + 1)).encode(),
+            )
+        ),
+    ],
+    ids=lambda sent: repr(sent[:12]),
+)
+def test_other_bytes_change_nothing(receiver: Receiver, sent: bytes) -> None:
+    hand_over_when_heard("/a.png")
+    receiver.take()
+    with socket.socket(socket.AF_UNIX) as stranger:
+        stranger.connect(window_address() or "")
+        stranger.sendall(sent)
+        if sent[4:] != b"half":
+            stranger.shutdown(socket.SHUT_WR)
+        with suppress(ConnectionResetError):  # not all of it was read
+            assert stranger.recv(64) == b"", "it is answered by the end alone"
+    assert receiver.take() is None
+    assert hand_over(["/b.png"])
+    assert receiver.take() == ("/b.png",)
+
+
+def test_a_window_closes_although_senders_hold_it_up(receiver: Receiver) -> None:
+    hand_over_when_heard("/a.png")
+    strangers = [socket.socket(socket.AF_UNIX) for _ in range(8)]
+    for stranger in strangers:
+        stranger.connect(window_address() or "")
+    receiver.close()
+    for stranger in strangers:
+        stranger.close()
+
+
+def test_displays_have_their_own_windows_and_a_foreign_folder_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = window_address()
+    monkeypatch.setenv("DISPLAY", ":7/7")
+    assert window_address() not in (first, None)
+    assert Path(window_address() or "").parent.stat().st_mode & 0o777 == 0o700
+    monkeypatch.setattr(os, "getuid", lambda: 12345)
+    assert window_address() is None

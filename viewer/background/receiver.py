@@ -1,0 +1,107 @@
+"""The window's ear: receives the paths that later starts of the program hand over, see `viewer.model.handover`."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from viewer.model.handover import MAX_BYTES, TAKEN, paths_from_message, window_address
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+if sys.platform != "win32":
+    import fcntl
+
+READ_S = 1
+"""Time for a sender to send its message, in seconds."""
+CLOSE_S = 2.0
+"""Time for the thread to end, in seconds."""
+BACKLOG = 16
+"""Number of senders that may wait."""
+
+
+class Receiver:
+    """Call it from the window's thread. Only the window that listens first receives; only the latest paths are kept."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when paths were received."""
+        self._wake = wake
+        self._received: deque[tuple[str, ...]] = deque(maxlen=1)
+        self._is_closed = False
+        self._address = ""
+        self._thread: threading.Thread | None = None
+
+    def listen(self) -> None:
+        """Begin to listen, unless another window does or there is no place for a socket."""
+        self._address = window_address() or ""
+        if self._address:
+            self._thread = threading.Thread(target=self._serve, name="iibr-receiver", daemon=True)
+            self._thread.start()
+
+    def take(self) -> tuple[str, ...] | None:
+        """Return the paths that were received since the last call, () without paths; None if nothing was received."""
+        return self._received.pop() if self._received else None
+
+    def close(self) -> None:
+        """Stop listening. A sender that holds the thread up is not waited for."""
+        self._is_closed = True
+        if self._thread is not None and self._thread.is_alive():
+            threading.Thread(target=self._wake_thread, daemon=True).start()
+            self._thread.join(CLOSE_S)
+
+    def _wake_thread(self) -> None:
+        from multiprocessing.connection import Client
+
+        with suppress(OSError):
+            Client(self._address).close()
+
+    def _serve(self) -> None:
+        from multiprocessing.connection import Listener  # takes 60 ms, for which the window does not wait
+
+        with suppress(OSError), _only_listener(self._address), Listener(self._address, backlog=BACKLOG) as listener:
+            while not self._is_closed:
+                with listener.accept() as connection:
+                    self._receive(connection)
+
+    def _receive(self, connection: Connection) -> None:
+        paths = paths_from_message(_read(connection))
+        if paths is not None and not self._is_closed:
+            self._received.append(paths)
+            self._wake()
+            with suppress(OSError):
+                connection.send_bytes(TAKEN)
+
+
+@contextmanager
+def _only_listener(address: str) -> Iterator[None]:
+    """Be the only process that listens at an address, and remove the socket that a killed window left.
+
+    Raises OSError if another process listens. The system frees the lock when the process ends; on Windows the pipe is
+    a lock of its own.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    with open(f"{address}.lock", "ab") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with suppress(FileNotFoundError):
+            os.unlink(address)
+        yield
+
+
+def _read(connection: Connection) -> bytes:
+    """Return the message of a sender, b"" if none comes in time or it is too long."""
+    if sys.platform != "win32":  # the sender may stop in the middle
+        with socket.socket(fileno=os.dup(connection.fileno())) as twin:
+            twin.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", READ_S, 0))
+    try:
+        return connection.recv_bytes(MAX_BYTES) if connection.poll(READ_S) else b""
+    except (OSError, EOFError):
+        return b""
