@@ -139,7 +139,7 @@ class Window:
         """
         if not self._has_icon:
             folder = resource_folder("assets") / "icon"
-            icons = [
+            icons: list[Any] = [
                 (size, size, np.asarray(Image.open(folder / f"iibr-{size}.png", formats=["PNG"])).tolist())
                 for size in ICON_SIZES_PX
             ]
