@@ -8,6 +8,7 @@ import signal
 import sys
 import traceback
 import warnings
+from contextlib import suppress
 
 EXIT_UNEXPECTED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STDOUT, STDERR = 1, 2
@@ -16,6 +17,8 @@ GC_THRESHOLDS = 100_000, 20, 100
 """Thresholds of Python's garbage collector. Its usual ones, from 700 objects on, cost 0.3 s during imports."""
 TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
 """Environment variable that asks for the traceback of an unexpected error on stderr."""
+WINDOW_COMMANDS = "open", "view", "demo"
+"""Commands that open a window."""
 
 
 def command() -> None:
@@ -31,6 +34,12 @@ def command() -> None:
         sys.stderr.flush()
         _discard(STDERR)
     sys.exit(code)
+
+
+def open_window() -> None:
+    """Run `iibr open`, for starts without a console."""
+    sys.argv.insert(1, "open")
+    command()
 
 
 def _discard(descriptor: int) -> None:
@@ -54,7 +63,8 @@ def run() -> int:
         from viewer.cli.main import app
 
         code = int(app(standalone_mode=False) or 0)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except KeyboardInterrupt:
         code = EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader ended, as in `iibr models | head -1`
@@ -67,7 +77,7 @@ def run() -> int:
 
 
 def _report(error: Exception) -> int:
-    """Print an error as one line. Return the exit code."""
+    """Print an error as one line, and show it to a person who sees no terminal. Return the exit code."""
     import typer
 
     from iibr_core.types import InputError
@@ -88,8 +98,22 @@ def _report(error: Exception) -> int:
     else:
         log = _log_traceback(error)
         message, code = f"unexpected {type(error).__name__}: {str(error)[:200]} (report it with {log})", EXIT_UNEXPECTED
-    print(f"iibr: {' '.join(message.split())}", file=sys.stderr)
+    message = " ".join(message.split())
+    print(f"iibr: {message}", file=sys.stderr)
+    if _is_started_from_desktop():
+        with suppress(Exception):  # the error itself may lie in a library that the dialog needs
+            from viewer.app.dialogs import show_error
+
+            show_error(message)
     return code
+
+
+def _is_started_from_desktop() -> bool:
+    """Return whether a menu or file manager opened a window, so that nobody reads stderr."""
+    word = "".join(sys.argv[1:2])
+    if sys.stderr is None:
+        return not word or word in WINDOW_COMMANDS or os.path.exists(word)
+    return word == "open" and not any(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
 
 
 def _log_traceback(error: Exception) -> str:

@@ -27,6 +27,32 @@ def test_output_that_cannot_be_written_is_one_line_and_a_reader_that_ends_is_no_
     assert in_shell("iibr models | head -0").stderr == ""
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems show their dialog without a program")
+@pytest.mark.parametrize(
+    ("words", "has_stderr", "is_shown"),
+    [
+        ("open gone.png", True, True),
+        ("view gone.png", False, True),
+        ("view gone.png", True, False),
+        ("export gone.png", False, False),
+    ],
+)
+def test_an_error_is_shown_in_a_dialog_to_whoever_sees_no_terminal(
+    tmp_path: Path, words: str, has_stderr: bool, is_shown: bool
+) -> None:
+    shown, dialog = tmp_path / "shown", tmp_path / "zenity"
+    dialog.write_text(f'#!/bin/sh\nprintf "%s\\n" "$@" >> {shown}\n')
+    dialog.chmod(0o755)
+    code = f"import sys; sys.argv = {['iibr', *words.split()]}; from viewer.entry import command; command()"
+    command = ["bash", "-c", f'"$0" -P -c "$1" {"" if has_stderr else ">&- 2>&-"}', sys.executable, code]
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(command, env=env, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert ("gone.png: no such file" in done.stderr) is has_stderr
+    assert shown.exists() is is_shown
+    assert not is_shown or "gone.png: no such file" in shown.read_text()
+
+
 @pytest.mark.parametrize(
     ("failure", "code", "message"),
     [

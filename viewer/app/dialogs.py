@@ -1,4 +1,4 @@
-"""The system's file dialogs, one at a time; they do not block the window."""
+"""The system's dialogs: for files, one at a time, which do not block the window, and for errors at the start."""
 
 from __future__ import annotations
 
@@ -51,6 +51,14 @@ class Dialog:
 def has_dialogs() -> bool:
     """Return whether this system has file dialogs."""
     return sys.platform in ("win32", "darwin") or any(map(shutil.which, UNIX_HELPERS))
+
+
+def show_error(message: str) -> None:
+    """Show a message until the user closes it, where this system has dialogs."""
+    from imgui_bundle import portable_file_dialogs as dialogs
+
+    if has_dialogs():
+        dialogs.message("iibr", message, dialogs.choice.ok, dialogs.icon.error).result()
 
 
 def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:

@@ -206,6 +206,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Reset text size", do(preferences.set_font_scale, 1.0), "ctrl+_0"),
     Command("All commands", _toggle_palette, "ctrl+p"),
     Command("Mouse and keys", lambda s: do(messages.show_prompt, None if s.prompt == "help" else "help"), "f1"),
+    Command("About iibr", do(messages.show_prompt, "about")),
     Command("Quit", do(saving.quit_window), "ctrl+q"),
 )
 BY_NAME = {command.name: command for command in COMMANDS}

@@ -1,9 +1,10 @@
-"""The version and the commit of the program, as a person reports them."""
+"""The version and the commit of the program, as a person reports them, its licence and its pages in the web."""
 
 from __future__ import annotations
 
 import subprocess
-from importlib.metadata import version
+from functools import cache
+from importlib.metadata import metadata, version
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -17,6 +18,7 @@ def program_version() -> str:
     return version("iibr")
 
 
+@cache
 def program_commit() -> str:
     """Return the commit, with `-dirty` after it where a checkout differs from it; "unknown" without git."""
     if COMMIT_FILE.is_file():
@@ -28,3 +30,16 @@ def program_commit() -> str:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return UNKNOWN
+
+
+@cache
+def program_licence() -> str:
+    """Return the licence as an SPDX expression."""
+    return "".join(metadata("iibr").get_all("License-Expression") or ())
+
+
+@cache
+def program_pages() -> dict[str, str]:
+    """Return the addresses of the program's pages by name: those of `project.urls` in `pyproject.toml`."""
+    pages = (page.partition(", ") for page in metadata("iibr").get_all("Project-URL") or ())
+    return {name: address for name, _, address in pages}

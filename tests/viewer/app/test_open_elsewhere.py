@@ -34,7 +34,8 @@ def places(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 
 @pytest.fixture
 def open_photos(places: dict[str, str], tmp_path: Path) -> OpenPhotos:
-    return lambda *paths: run_forked("open", *paths, cwd=tmp_path, **places)
+    """The program has no path, and so no dialog that would wait for a person."""
+    return lambda *paths: run_forked("open", *paths, cwd=tmp_path, **places, PATH="")
 
 
 def test_later_starts_open_their_photos_in_the_window_that_is_there(

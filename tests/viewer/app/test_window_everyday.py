@@ -135,6 +135,26 @@ def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: P
     assert driver.app.state.facts.facts == (("Camera", "Maker"), ("Exposure", "1/60 s, ISO 200"))
 
 
+def test_about_opens_the_page_of_releases_only_when_that_is_asked_for(
+    viewer: Driver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    pages = {"Releases": "https://example.org/releases", "Documentation": "https://example.org/docs"}
+    monkeypatch.setattr("viewer.ui.overlays.about_prompt.program_pages", lambda: pages)
+    monkeypatch.setattr("viewer.app.side_effects.typer.launch", lambda place, locate: opened.append(place))
+    viewer.send("key", "F1")
+    viewer.until(lambda app: app.state.prompt == "help")
+    viewer.press("About", "prompt str")
+    viewer.until(lambda app: app.state.prompt == "about")
+    viewer.until_idle()
+    assert not opened
+    viewer.press("Look for a newer version", "prompt str")
+    viewer.until(lambda app: bool(opened))
+    viewer.press("Libraries and licences", "prompt str")
+    viewer.until(lambda app: len(opened) == 2)
+    assert opened == ["https://example.org/releases", "https://example.org/docs/licences.md"]
+
+
 def test_keys_for_help_palette_text_size_and_exports(viewer: Driver) -> None:
     viewer.send("key", "F1")
     viewer.until(lambda app: app.state.prompt == "help")

@@ -109,6 +109,7 @@ def test_no_widget_is_cut_and_none_lies_over_another(
 
 PROMPTS: dict[str, Prompt] = {
     "help": "help",
+    "about": "about",
     "quit": "quit",
     "quit while busy": "quit",
     "palette": PalettePrompt(),

@@ -62,8 +62,9 @@ class PalettePrompt:
     selected: int = 0
 
 
-Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit", "exports"]
+PlainPrompt = Literal["help", "about", "quit", "exports"]
 """quit: whether to close although jobs are under way. exports: the list of exports."""
+Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | PlainPrompt
 
 JobKind = Literal["picture", "map", "copy", "export"]
 

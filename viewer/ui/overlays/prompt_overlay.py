@@ -25,6 +25,7 @@ from viewer.model.state.prompts import (
 )
 from viewer.model.state.tasks import TakePathTask
 from viewer.ui.overlays import prompt_rows as rows
+from viewer.ui.overlays.about_prompt import about_prompt
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.notice_corner import build_rows, job_rows
@@ -107,6 +108,8 @@ def _contents(prompt: Prompt, state: AppState) -> list[Action]:
             return _exports(state)
         case "quit":
             return _quit(state)
+        case "about":
+            return about_prompt()
         case "help":
             keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
             return _help([*MOUSE, *keys])
@@ -186,12 +189,14 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
 
 
 def _help(keys: list[tuple[str, str]]) -> list[Action]:
-    """Draw the map of mouse and keys; the button stays in sight while the rows scroll."""
+    """Draw the map of mouse and keys; the buttons stay in sight while the rows scroll."""
     style = imgui.get_style()
-    button_width = imgui.calc_text_size("Close").x + 2 * style.frame_padding.x
+    widths = [imgui.calc_text_size(words).x + 2 * style.frame_padding.x for words in ("About", "Close")]
     imgui.align_text_to_frame_padding()
     imgui.text("Mouse and keys")
-    imgui.same_line(imgui.get_window_width() - style.window_padding.x - button_width)
+    imgui.same_line(imgui.get_window_width() - style.window_padding.x - sum(widths) - style.item_spacing.x)
+    actions = [do(messages.show_prompt, "about")] if button("About") else []
+    imgui.same_line()
     is_closed = button("Close")
     gap()
     if imgui.begin_table("keys", 2, imgui.TableFlags_.scroll_y):
@@ -203,7 +208,7 @@ def _help(keys: list[tuple[str, str]]) -> list[Action]:
             imgui.table_next_column()
             imgui.text_wrapped(meaning.rstrip("…"))
         imgui.end_table()
-    return [do(messages.show_prompt, None)] if is_closed else []
+    return [do(messages.show_prompt, None)] if is_closed else actions
 
 
 def _quit(state: AppState) -> list[Action]:

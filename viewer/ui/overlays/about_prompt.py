@@ -1,0 +1,27 @@
+"""The prompt about the program: version, licence, and pages in the web, which only a button opens."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.model import messages
+from viewer.model.action import Action, ask, do
+from viewer.model.state.tasks import ShowFileTask
+from viewer.model.version import program_commit, program_licence, program_pages, program_version
+from viewer.ui.overlays.prompt_rows import button_rows
+from viewer.ui.widgets import gap, quiet
+
+
+def about_prompt() -> list[Action]:
+    """Draw what the program is, and a button for each page; return the actions of the pressed ones."""
+    imgui.text(f"iibr {program_version()}")
+    quiet(f"Commit {program_commit()}, licence {program_licence()}")
+    quiet("The program never looks for a newer version by itself.")
+    gap()
+    pages = program_pages()
+    offers = {
+        "Look for a newer version": pages.get("Releases"),
+        "Libraries and licences": f"{pages['Documentation']}/licences.md" if "Documentation" in pages else None,
+    }
+    shown = [(words, do(ask, ShowFileTask(page))) for words, page in offers.items() if page]
+    return button_rows([*shown, ("Close", do(messages.show_prompt, None))])
