@@ -11,7 +11,7 @@ READY_TESTS := $(VENV)/.ready-tests
 KERNELS := $(VENV)/.kernels
 HEADSET := tests/web/node_modules
 
-.PHONY: run test bench figures fuzz site install kernels dist clean
+.PHONY: run test bench figures fuzz site licences install kernels dist clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
@@ -49,6 +49,10 @@ site: $(READY)
 	$(PIP) -e '.[docs]'
 	$(BIN)/python -P -m sphinx -q -W --keep-going -n -b html -d out/site-trees docs out/site
 	@echo "out/site/index.html"
+
+# docs/licences.md: the licences of all libraries of an installation.
+licences: install
+	$(BIN)/python -P packaging/licences.py --output docs/licences.md
 
 install: $(READY_TESTS)
 
