@@ -9,6 +9,7 @@ import sys
 import traceback
 import warnings
 from contextlib import suppress
+from pathlib import Path
 
 EXIT_UNEXPECTED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STDOUT, STDERR = 1, 2
@@ -116,14 +117,19 @@ def _is_started_from_desktop() -> bool:
     return word == "open" and not any(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
 
 
-def _log_traceback(error: Exception) -> str:
-    """Write the traceback to a log, and to stderr if that is asked for. Return the name of the log."""
+def log_file() -> Path:
+    """Return the file for the traceback of the last unexpected error; its folder may not exist yet."""
     from platformdirs import user_log_path
 
+    return user_log_path("iibr", appauthor=False) / "traceback.log"
+
+
+def _log_traceback(error: Exception) -> str:
+    """Write the traceback to a log, and to stderr if that is asked for. Return the name of the log."""
     text = "".join(traceback.format_exception(error))
     if os.environ.get(TRACEBACK_VARIABLE):
         print(text, file=sys.stderr)
-    path = user_log_path("iibr", appauthor=False) / "traceback.log"
+    path = log_file()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, "utf-8")

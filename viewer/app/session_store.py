@@ -35,7 +35,7 @@ class SessionStore:
 
     def __init__(self, folder: Path | None, wake: Callable[[], None]) -> None:
         """folder: of the user's settings; None keeps nothing. wake: called, in the thread, when a session was read."""
-        self._folder = None if folder is None else folder / "sessions"
+        self._folder = None if folder is None else sessions_folder(folder)
         self._wake = wake
         self._executor = ThreadPoolExecutor(1, "iibr-sessions")
         self._scene: Scene | None = None
@@ -103,6 +103,11 @@ class SessionStore:
         is_new, self._has_failed = not self._has_failed, self._has_failed or error is not None
         text = f"{error} Your changes are not kept for the next time."
         return [do(messages.notify, Notice(text))] if error is not None and is_new else []
+
+
+def sessions_folder(folder: Path) -> Path:
+    """Return the folder of sessions within that of the user's settings."""
+    return folder / "sessions"
 
 
 def key_of(source: Source) -> str:
