@@ -190,7 +190,7 @@ def texts() -> str:
 
 
 def _texts_of(name: str, library: Distribution) -> str:
-    """Return a library's licence texts, and the names of what is compiled into it as its bill of materials has them."""
+    """Return a library's licence texts, after the names in its bill of materials."""
     licence = licence_of(name, library)
     files = [library.locate_file(file) for file in library.files or ()]
     found = [Path(str(file)).read_text("utf-8", "replace") for file in files if _is_text(file)]
@@ -213,7 +213,7 @@ def _heading(title: str, text: str) -> str:
 
 
 def main() -> int:
-    """Do what the options say; return the exit code."""
+    """Write the files that the options name, and judge the folder; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, help="page to write, in Markdown")
     parser.add_argument("--texts", type=Path, help="file for all licence texts")
