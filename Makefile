@@ -11,7 +11,7 @@ READY_TESTS := $(VENV)/.ready-tests
 KERNELS := $(VENV)/.kernels
 HEADSET := tests/web/node_modules
 
-.PHONY: run test bench figures fuzz site licences install kernels dist clean
+.PHONY: run test bench figures fuzz site licences install kernels dist bundle deb rpm clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
@@ -94,6 +94,40 @@ dist: install
 		fi; \
 	done
 	$(BIN)/python -m twine check --strict dist/iibr-*
+
+# out/bundle/iibr: the program with its Python, for computers without one. PyInstaller needs a Python with a shared
+# library, as Debian's. Kernels are compiled again when a source of the core is newer.
+BUNDLE_PYTHON ?= /usr/bin/python3
+BUNDLE_BIN := out/bundle-venv/bin
+BUNDLE_PIP := HATCH_BUILD_NO_HOOKS=true $(BUNDLE_BIN)/python -m pip install --quiet --disable-pip-version-check
+
+bundle: out/bundle/.ready
+
+$(BUNDLE_BIN)/.ready: pyproject.toml constraints.txt
+	@.ci/system-libraries bundle
+	$(BUNDLE_PYTHON) -m venv --clear out/bundle-venv
+	$(BUNDLE_PIP) -c constraints.txt '.[bundle]'
+	@touch $@
+
+$(BUNDLE_BIN)/.kernels: $(BUNDLE_BIN)/.ready $(shell find iibr_core viewer/precompile.py -name '*.py')
+	$(BUNDLE_PIP) --no-deps --force-reinstall .
+	$(BUNDLE_BIN)/python -P -m viewer.precompile \
+		"$$($(BUNDLE_BIN)/python -P -c 'import iibr_core; print(iibr_core.__path__[0])')/_kernels"
+	@touch $@
+
+out/bundle/.ready: $(BUNDLE_BIN)/.kernels packaging/iibr.spec $(shell find viewer shaders assets web -type f -not -name '*.pyc')
+	$(BUNDLE_PIP) --no-deps --force-reinstall .
+	$(BUNDLE_BIN)/python -P -m PyInstaller --log-level WARN --noconfirm --distpath out/bundle --workpath out/bundle-work \
+		packaging/iibr.spec
+	@touch $@
+
+# dist/iibr_*.deb and dist/iibr-*.rpm: the bundle as a package.
+deb rpm: out/bundle/.ready
+	$(BUNDLE_BIN)/python -P packaging/linux/pages.py out/pages
+	$(BUNDLE_BIN)/python -P packaging/licences.py --texts out/pages/copyright
+	@mkdir -p dist
+	VERSION=$$($(BUNDLE_BIN)/python -P -c 'from importlib.metadata import version; print(version("iibr"))') \
+		$(BUNDLE_BIN)/nfpm package --config packaging/linux/nfpm.yaml --packager $@ --target dist/
 
 clean:
 	rm -rf $(VENV) $(HEADSET) out dist iibr_core/_kernels

@@ -53,6 +53,8 @@ def run() -> int:
 
     Each error is one line on stderr.
     """
+    if getattr(sys, "frozen", False):
+        _enter_bundle()
     gc.set_threshold(*GC_THRESHOLDS)
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # libraries' warnings; Python's option -W shows them
@@ -75,6 +77,17 @@ def run() -> int:
     if code == EXIT_INTERRUPTED:
         print("iibr: interrupted", file=sys.stderr)
     return code
+
+
+def _enter_bundle() -> None:
+    """Give child programs the system's libraries instead of the bundle's. A worker process works, and ends here."""
+    import multiprocessing
+
+    libraries = os.environ.pop("LD_LIBRARY_PATH_ORIG", "")  # what PyInstaller replaced
+    os.environ.pop("LD_LIBRARY_PATH", None)
+    if libraries:
+        os.environ["LD_LIBRARY_PATH"] = libraries
+    multiprocessing.freeze_support()
 
 
 def _report(error: Exception) -> int:

@@ -261,8 +261,11 @@ def _open(title: str, place: tuple[int, int, int, int] | None, is_maximized: boo
 
 
 def hint_context() -> None:
-    """Ask for OpenGL 3.3 core in the next window, and nothing else."""
+    """Ask for OpenGL 3.3 core in the next window, and for the names by which desktops find the program's icon."""
     glfw.default_window_hints()
+    glfw.window_hint_string(glfw.X11_CLASS_NAME, "iibr")
+    glfw.window_hint_string(glfw.X11_INSTANCE_NAME, "iibr")
+    glfw.window_hint_string(glfw.WAYLAND_APP_ID, "io.github.iibr.iibr")
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
