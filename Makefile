@@ -93,7 +93,7 @@ dist: install
 			echo "no $$python here: no wheel with kernels for it"; \
 		fi; \
 	done
-	$(BIN)/python -m twine check --strict dist/iibr-*
+	$(BIN)/python -m twine check --strict dist/iibr-*.whl dist/iibr-*.tar.gz
 
 # out/bundle/iibr: the program with its Python, for computers without one. PyInstaller needs a Python with a shared
 # library, as Debian's. Kernels are compiled again when a source of the core is newer.

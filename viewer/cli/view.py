@@ -73,6 +73,12 @@ def open_last_scene() -> None:
 
 def open_window(source: Source | None, depth_strength: float = 1.0, *actions: Action) -> None:
     """Run the window, first with these actions, until it is closed. Raises InputError if it cannot be opened."""
+    try:
+        import imgui_bundle  # noqa: F401  its library asks for others of the system
+    except ImportError as error:
+        raise InputError(
+            f"no window can be opened ({error}): install that library; `iibr screenshot` works without a display"
+        ) from error
     from viewer.app.main_loop import initial_state, run
 
     run(AppState() if source is None else initial_state(source, depth_strength), user_folder(), *actions)

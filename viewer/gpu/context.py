@@ -77,7 +77,9 @@ def usual_backends(platform: str) -> tuple[str, ...]:
 
 def _create(name: str) -> GLContext:
     settings: dict[str, Any] = {"backend": "egl"} if name == "egl" else {}
-    remedy = "install libegl1 and libgl1-mesa-dri" if name == "egl" else "install the driver of the graphics card"
+    remedy = (
+        "install libegl1, libgl1 and libgl1-mesa-dri" if name == "egl" else "install the driver of the graphics card"
+    )
     try:
         return GLContext(moderngl.create_context(require=330, standalone=True, **settings), name)
     except Exception as error:  # the loader raises plain Exception for every failure
@@ -98,8 +100,11 @@ def create_for_window(window: Any) -> GLContext:
 
 def _create_osmesa() -> GLContext:
     """Return a context of the software renderer OSMesa on GLFW's null platform."""
-    with warnings.catch_warnings(action="ignore"):  # GLFW reports failures as warnings
-        window = _null_window()
+    try:
+        with warnings.catch_warnings(action="ignore"):  # GLFW reports failures as warnings
+            window = _null_window()
+    except ImportError as error:  # its library asks for others, which a machine without a desktop lacks
+        raise InputError(f"osmesa: {error}") from error
     try:
         if window is None:
             raise ValueError("libOSMesa not found or too old (install libosmesa6)")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import platform
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from tests.viewer.cli.conftest import Iibr, output_of
+from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
 from viewer.gpu import context
 from viewer.model import version
 
@@ -27,11 +28,14 @@ def test_the_version_names_commit_gl_and_python(iibr: Iibr) -> None:
     assert python == f"Python {platform.python_version()}"
 
 
-def test_the_version_says_why_there_is_no_gl(iibr: Iibr, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_libraries_of_a_desktop_each_command_says_why(
+    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, photo_path: Path
+) -> None:
     monkeypatch.setattr(context, "usual_backends", lambda platform: ("osmesa",))
-    monkeypatch.setattr(context, "_null_window", lambda: None)
+    monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     (line,) = [line for line in output_of(iibr("--version")).splitlines() if line.startswith("OpenGL")]
-    assert line.startswith("OpenGL unavailable: no OpenGL 3.3 without a display: osmesa: libOSMesa not found")
+    assert line.startswith("OpenGL unavailable: no OpenGL 3.3 without a display: osmesa: import of imgui_bundle")
+    assert "no window can be opened (import of imgui_bundle" in refusal_of(iibr("view", photo_path))
 
 
 def test_the_commit_comes_from_the_packaged_file_or_from_git(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
