@@ -123,7 +123,7 @@ def _report(error: Exception) -> int:
 
 
 def _is_started_from_desktop() -> bool:
-    """Return whether a menu or file manager opened a window, so that nobody reads stderr."""
+    """Return whether a menu or file manager opened a window, without a terminal that shows stderr."""
     word = "".join(sys.argv[1:2])
     if sys.stderr is None:
         return not word or word in WINDOW_COMMANDS or os.path.exists(word)

@@ -10,12 +10,10 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from multiprocessing.connection import Client, Connection, Listener
 
 from viewer.model.handover import MAX_BYTES, TAKEN, paths_from_message, window_address
 
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
 if sys.platform != "win32":
     import fcntl
 
@@ -57,14 +55,10 @@ class Receiver:
             self._thread.join(CLOSE_S)
 
     def _wake_thread(self) -> None:
-        from multiprocessing.connection import Client
-
         with suppress(OSError):
             Client(self._address).close()
 
     def _serve(self) -> None:
-        from multiprocessing.connection import Listener  # takes 60 ms, for which the window does not wait
-
         with suppress(OSError), _only_listener(self._address), Listener(self._address, backlog=BACKLOG) as listener:
             while not self._is_closed:
                 with listener.accept() as connection:

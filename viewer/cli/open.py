@@ -37,7 +37,7 @@ def open_photos(
 
 def hand_over(paths: list[str]) -> bool:
     """Let the running window open these paths; return whether it does."""
-    from multiprocessing.connection import Client  # 60 ms, which no other command needs
+    from multiprocessing.connection import Client  # no other command needs it
 
     address = window_address()
     if address is None:

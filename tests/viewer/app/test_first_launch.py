@@ -12,20 +12,24 @@ import pytest
 from tests.viewer.conftest import DEADLINE_S, Opener
 from viewer.app.preferences_store import store_preferences
 from viewer.model.state.app_state import AppState
+from viewer.model.state.preferences import Preferences
+from viewer.model.state.prompts import PathPrompt
 
 
 def test_an_empty_window_offers_to_open_a_photo_and_to_see_the_demo(
     open_window: Opener, no_dialogs: None, tmp_path: Path
 ) -> None:
+    store_preferences(AppState(preferences=Preferences(opened_folder=str(tmp_path))), tmp_path / "kept")
     driver = open_window(None, kept_in=tmp_path / "kept")
     driver.press("Open a photo…", "welcome")
-    driver.until(lambda app: app.state.prompt is not None)
+    driver.until(lambda app: app.state.prompt == PathPrompt("photo", os.path.join(tmp_path, "")))
     driver.send("key", "Escape")
     driver.until(lambda app: app.state.prompt is None)
     driver.press("See the demo", "welcome")
     driver.until(lambda app: app.state.scene is not None)
     assert driver.app.state.scene is not None
     assert driver.app.state.scene.name == "motorcycle"
+    assert driver.app.state.preferences.opened_folder == str(tmp_path), "the user's own folder"
 
 
 def test_a_click_opens_a_recent_photo_and_photos_that_are_gone_are_not_shown(

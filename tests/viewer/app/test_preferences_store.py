@@ -69,6 +69,7 @@ def test_values_of_other_versions_are_left_out_and_too_large_ones_limited(tmp_pa
         "font_scale": 1e9,
         "language": "de",
         "last_folder": str(tmp_path / "gone"),
+        "opened_folder": str(tmp_path / "gone"),
         "head_range_cm": -1,
     }
     (tmp_path / PREFERENCES_FILE).write_text(json.dumps(kept))
