@@ -117,13 +117,14 @@ def test_the_wheel_has_what_the_program_reads_and_nothing_else(wheel: Path) -> N
 
 def test_the_source_package_builds_and_tests_the_program(sdist: Path, source: Path) -> None:
     assert sdist.stat().st_size < MAX_SDIST_BYTES
-    assert {"Makefile", "constraints.txt", "LICENSE", ".ci", "docs", "tests"} <= set(os.listdir(source))
+    assert {"Makefile", "constraints.txt", "LICENSE", ".ci", "docs", "packaging", "tests"} <= set(os.listdir(source))
     names = {part for path in source.rglob("*") for part in path.relative_to(source).parts}
     assert not names & {".git", ".venv", ".mypy_cache", "__pycache__", "_kernels", "node_modules", "out", "dist"}
 
 
 def test_commands_lead_to_functions(distribution: Distribution) -> None:
-    assert {command.name for command in distribution.entry_points} == {"iibr"}
+    groups = {command.name: command.group for command in distribution.entry_points}
+    assert groups == {"iibr": "console_scripts", "iibr-window": "gui_scripts"}
     assert all(callable(command.load()) for command in distribution.entry_points)
 
 
