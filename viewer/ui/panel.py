@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
 from iibr_core.scenes.lens_limits import aperture_limit
-from iibr_core.scenes.scene import Progress, Scene
+from iibr_core.scenes.scene import Progress, Scene, source_beside
 from viewer.model import opening, preferences
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME
@@ -146,6 +146,19 @@ def _tools(tools: tuple[tuple[str, str], ...], state: AppState) -> list[Action]:
     return actions
 
 
+def _recent(state: AppState) -> list[Action]:
+    """List the recent files other than the open one."""
+    paths = opening.other_recent(state)
+    actions: list[Action] = []
+    if paths:
+        quiet("Recent")
+    for path, name in zip(paths, opening.names_of(paths)):
+        if imgui.selectable(f"{name}##{path}", False)[0]:
+            actions.append(do(opening.open_source, source_beside(state.source, path)))
+        tooltip(path)
+    return actions
+
+
 def _progress(state: AppState) -> list[Action]:
     """Build a bar, which stays when the work is done so that nothing below it jumps, and a button to stop the work."""
     progress = state.progress
@@ -188,7 +201,7 @@ def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
 
 def _more(state: AppState, scene: Scene) -> list[Action]:
     """Build what stands before the sections under "More": tools and recent files."""
-    return _tools(MORE_TOOLS, state)
+    return _tools(MORE_TOOLS, state) + _recent(state)
 
 
 def _scene(state: AppState, scene: Scene) -> list[Action]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.viewer.conftest import DEADLINE_S, Opener
+from tests.viewer.conftest import DEADLINE_S, Opener, write_scene
 from viewer.app.preferences_store import store_preferences
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import Preferences
@@ -45,6 +45,16 @@ def test_a_click_opens_a_recent_photo_and_photos_that_are_gone_are_not_shown(
     assert driver.app.state.scene.name == "scene"
     assert driver.app.state.preferences.opened_folder == str(photo_path.parent)
     assert driver.app.state.recent == (str(photo_path), gone), "its disk may be back the next time"
+
+
+def test_recent_photos_stay_at_hand_while_one_is_open(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    other = write_scene(tmp_path, "other")
+    kept = Preferences(open_sections=("more",))
+    store_preferences(AppState(recent=(str(other),), preferences=kept), tmp_path / "kept")
+    driver = open_window(photo_path, kept_in=tmp_path / "kept")
+    driver.until_idle()
+    driver.press(f"other.png##{other}")
+    driver.until(lambda app: app.state.scene.name == "other")
 
 
 @pytest.mark.parametrize(
