@@ -96,7 +96,8 @@ dist: install
 	$(BIN)/python -m twine check --strict dist/iibr-*.whl dist/iibr-*.tar.gz
 
 # out/bundle/iibr: the program with its Python, for computers without one. PyInstaller needs a Python with a shared
-# library, as Debian's. Kernels are compiled again when a source of the core is newer.
+# library, as Debian 12's, which asks for glibc 2.35; the wheels ask for 2.28, so a Python built for that takes the bundle
+# to older systems: packaging/linux/nfpm.yaml states it. Kernels are compiled again when a source of the core is newer.
 BUNDLE_PYTHON ?= /usr/bin/python3
 BUNDLE_BIN := out/bundle-venv/bin
 BUNDLE_PIP := HATCH_BUILD_NO_HOOKS=true $(BUNDLE_BIN)/python -m pip install --quiet --disable-pip-version-check
