@@ -122,13 +122,24 @@ out/bundle/.ready: $(BUNDLE_BIN)/.kernels packaging/iibr.spec $(shell find viewe
 		packaging/iibr.spec
 	@touch $@
 
-# dist/iibr_*.deb and dist/iibr-*.rpm: the bundle as a package.
-deb rpm: out/bundle/.ready
+# dist/iibr_*.deb and dist/iibr-*.rpm: the bundle as a package. xz in place of nfpm's compressors saves a fifth.
+PACK = VERSION=$$($(BUNDLE_BIN)/python -P -c 'from importlib.metadata import version; print(version("iibr"))') \
+	$(BUNDLE_BIN)/nfpm package --config packaging/linux/nfpm.yaml --packager $@ --target
+
+rpm: out/pages/.ready
+	@mkdir -p dist
+	$(PACK) dist/
+
+deb: out/pages/.ready
+	@rm -rf out/deb && mkdir -p out/deb dist
+	$(PACK) out/deb/
+	cd out/deb && ar x iibr_*.deb data.tar && xz -6 -T2 data.tar && ar d iibr_*.deb data.tar && ar q iibr_*.deb data.tar.xz
+	mv out/deb/iibr_*.deb dist/
+
+out/pages/.ready: out/bundle/.ready packaging/licences.py packaging/native-libraries.csv $(wildcard packaging/linux/*) CHANGELOG.md
 	$(BUNDLE_BIN)/python -P packaging/linux/pages.py out/pages
 	$(BUNDLE_BIN)/python -P packaging/licences.py --texts out/pages/copyright
-	@mkdir -p dist
-	VERSION=$$($(BUNDLE_BIN)/python -P -c 'from importlib.metadata import version; print(version("iibr"))') \
-		$(BUNDLE_BIN)/nfpm package --config packaging/linux/nfpm.yaml --packager $@ --target dist/
+	@touch $@
 
 clean:
 	rm -rf $(VENV) $(HEADSET) out dist iibr_core/_kernels

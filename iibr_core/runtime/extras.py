@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.util import find_spec
 
 from iibr_core.types import InputError
@@ -23,5 +24,12 @@ def require_extra(extra: str, *packages: str) -> None:
 
 
 def how_to_install(extra: str) -> str:
-    """Return the command that installs an extra, as a clause of a sentence."""
-    return f"install with: pip install 'iibr[{extra}]'{LICENCES.get(extra, '')}"
+    """Return how a person installs an extra, as a clause of a sentence."""
+    return f"install with: {install_command(extra)}"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra. A packaged program has a Python of its own, which stays as it is."""
+    command = f"install 'iibr[{extra}]'{LICENCES.get(extra, '')}"
+    is_packaged = getattr(sys, "frozen", False)
+    return f"pipx {command}: nothing can be added to this package of iibr" if is_packaged else f"pip {command}"

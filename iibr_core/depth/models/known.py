@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR
-from iibr_core.runtime.extras import is_installed
+from iibr_core.runtime.extras import install_command, is_installed
 
 Runner = Literal["onnx", "transformers", "unidepth"]
 PACKAGES: dict[Runner, tuple[tuple[str, ...], str]] = {
     "onnx": (("onnxruntime",), "use Python 3.11 to 3.14, later ones have no package of it yet"),
-    "transformers": (("transformers", "torch"), "pip install 'iibr[depth]'"),
+    "transformers": (("transformers", "torch"), install_command("depth")),
     "unidepth": (("unidepth", "torch"), "follow github.com/lpiccinelli-eth/UniDepth"),
 }
 """Packages of each runner, and how to get them."""
