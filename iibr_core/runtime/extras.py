@@ -29,7 +29,7 @@ def how_to_install(extra: str) -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs an extra. A packaged program has a Python of its own, which stays as it is."""
+    """Return the command that installs an extra. Nothing can be added to a packaged program."""
     command = f"install 'iibr[{extra}]'{LICENCES.get(extra, '')}"
     is_packaged = getattr(sys, "frozen", False)
     return f"pipx {command}: nothing can be added to this package of iibr" if is_packaged else f"pip {command}"

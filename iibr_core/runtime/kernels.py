@@ -7,6 +7,7 @@ of this package that this one imports: Numba inlines kernels and constants of ot
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import inspect
 import os
@@ -107,7 +108,7 @@ class KernelLocator:
 def kernel_folder() -> Path:
     """Return the folder with all compiled kernels: the installation's own where that can be written to.
 
-    Else it is one in the user's cache, or without that a temporary one, which begins as a copy of the installation's.
+    Else it is one in the user's cache, or without that one for this run; it begins as a copy of the installation's.
     """
     if FOLDER_VARIABLE in os.environ:
         return Path(os.environ[FOLDER_VARIABLE]).absolute()
@@ -118,7 +119,9 @@ def kernel_folder() -> Path:
     try:
         _copy_kernels(folder)
     except OSError:
-        folder = Path(tempfile.mkdtemp(prefix="iibr-kernels-")) / "kernels"
+        scratch = tempfile.TemporaryDirectory(prefix="iibr-kernels-")
+        atexit.register(scratch.cleanup)
+        folder = Path(scratch.name) / "kernels"
         _copy_kernels(folder)
     return folder
 

@@ -57,10 +57,8 @@ class Window:
         self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
         self.held_at: dict[str, tuple[bool, bool]] = {}
-        self._has_icon = glfw.get_platform() not in (
-            glfw.PLATFORM_X11,
-            glfw.PLATFORM_WIN32,
-        )  # elsewhere none can be set
+        # Elsewhere none can be set.
+        self._needs_icon = glfw.get_platform() in (glfw.PLATFORM_X11, glfw.PLATFORM_WIN32)
         glfw.set_key_callback(self.handle, self._on_key)  # ImGui's own callback calls it
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
@@ -137,14 +135,14 @@ class Window:
 
         The first takes some 50 ms, most of it for loading Pillow's reader of PNG.
         """
-        if not self._has_icon:
+        if self._needs_icon:
             folder = resource_folder("assets") / "icon"
             icons: list[Any] = [
                 (size, size, np.asarray(Image.open(folder / f"iibr-{size}.png", formats=["PNG"])).tolist())
                 for size in ICON_SIZES_PX
             ]
             glfw.set_window_icon(self.handle, len(icons), icons)
-            self._has_icon = True
+            self._needs_icon = False
 
     def poll(self, wait_s: float) -> None:
         """Handle events; without any, wait for one at most this long."""

@@ -78,7 +78,9 @@ def test_kernels_are_kept_and_compiled_again_where_an_inlined_file_is_edited(pac
 def require_use_of_the_users_cache(package: Path) -> None:
     """An installation that cannot be written to is read, and what it lacks is kept in the user's cache."""
     shipped, cache = kernels_in(package / "_kernels"), package.parent / "cache"
+    scratch = package.parent / "scratch"
     cache.mkdir()
+    scratch.mkdir()
     folders = [package, *(path for path in package.rglob("*") if path.is_dir())]
     for folder in folders:
         folder.chmod(0o555)
@@ -86,7 +88,10 @@ def require_use_of_the_users_cache(package: Path) -> None:
         assert encode(package, *UNPRIVILEGED, XDG_CACHE_HOME=str(cache)) == (0.01292, False)
         assert encode(package, *UNPRIVILEGED, XDG_CACHE_HOME=str(cache), NUMBA_CPU_NAME="generic") == (0.01292, True)
         assert encode(package, *UNPRIVILEGED, XDG_CACHE_HOME=str(cache), NUMBA_CPU_NAME="generic") == (0.01292, False)
+        nowhere = {"XDG_CACHE_HOME": "/nonexistent", "TMPDIR": str(scratch)}
+        assert encode(package, *UNPRIVILEGED, **nowhere) == (0.01292, False)
     finally:
         for folder in folders:
             folder.chmod(0o755)
+    assert not list(scratch.iterdir()), "a user without a home leaves nothing"
     assert kernels_in(package / "_kernels") == shipped

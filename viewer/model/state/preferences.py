@@ -47,10 +47,9 @@ class Preferences:
 
     window: x, y, width, height in screen units, None before the first one; is_maximized: whether it filled the screen.
     last_folder: of the last saved or exported file, "" before the first; opened_folder: of the last opened photo.
-    estimates_depth: whether photos without depth
-    get it from the recommended model once that is downloaded. tracker: address of the tracker of the head.
-    head_range_cm: movement of the head from the middle to the outermost views. stereo_monitor: chosen
-    last; None for any.
+    estimates_depth: whether photos without depth get it from the recommended model once that is downloaded. tracker:
+    address of the tracker of the head. head_range_cm: movement of the head from the middle to the outermost views.
+    stereo_monitor: chosen last; None for any.
     """
 
     theme: Theme = "dark"
