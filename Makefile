@@ -11,7 +11,7 @@ READY_TESTS := $(VENV)/.ready-tests
 KERNELS := $(VENV)/.kernels
 HEADSET := tests/web/node_modules
 
-.PHONY: run test bench figures fuzz site licences install kernels dist bundle deb rpm clean
+.PHONY: run test test-bundle bench figures fuzz site licences install kernels dist bundle deb rpm clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
@@ -26,6 +26,13 @@ test: install kernels
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+
+# Installs the packages in Debian 12 and 13 and Ubuntu 22.04 and 24.04 without Python, and uses them there: as root, in some
+# minutes. ARGS: more words for pytest. What is downloaded is kept in out/chroots.
+test-bundle: install deb rpm
+	@.ci/system-libraries test
+	@.ci/system-libraries test-bundle
+	$(BIN)/pytest tests/bundle $(ARGS)
 
 # Compares our views with a plain warp's. DATA: a folder of scenes as `iibr evaluate` takes them; without it, drawn scenes.
 # ARGS: more words, see `python -m benchmarks compare --help`.
