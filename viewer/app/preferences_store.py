@@ -78,7 +78,8 @@ class PreferencesKeeper:
         try:
             store_preferences(state, self._folder)
         except InputError as error:
-            return [do(messages.notify, Notice(str(error), is_error=True))]
+            text = f"Settings and recent photos are not kept. {str(error).partition(';')[0]}."
+            return [do(messages.notify, Notice(text, is_error=True))]
         return []
 
 

@@ -10,7 +10,14 @@ import pytest
 
 from iibr_core.types import InputError
 from tests.viewer.conftest import reduce
-from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
+from viewer.app.preferences_store import (
+    PREFERENCES_FILE,
+    RECENT_FILE,
+    PreferencesKeeper,
+    last_opened,
+    load_preferences,
+    store_preferences,
+)
 from viewer.model import preferences, tracking
 from viewer.model.action import do
 from viewer.model.preferences import FONT_SCALE_LIMITS
@@ -83,3 +90,11 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="file") as error:
         store_preferences(AppState(), tmp_path / "file" / "folder")
     assert "\n" not in str(error.value)
+
+
+def test_who_has_no_home_folder_is_not_asked_to_choose_another(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    keeper = PreferencesKeeper(AppState(), tmp_path / "file" / "folder")
+    (notice,) = reduce(AppState(), keeper.keep(AppState(), is_closing=True)[0]).notices
+    assert notice.text.startswith("Settings and recent photos are not kept. ")
+    assert "choose" not in notice.text
