@@ -41,13 +41,14 @@ def test_without_the_libraries_of_a_desktop_each_command_says_why(
 def test_the_commit_comes_from_the_packaged_file_or_from_git(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     package = tmp_path / "viewer"
     package.mkdir()
+    commit = version.program_commit.__wrapped__  # asked anew each time
     monkeypatch.setattr(version, "PACKAGE", package)
     monkeypatch.setattr(version, "COMMIT_FILE", package / "_commit.txt")
-    assert version.program_commit() == "unknown"
+    assert commit() == "unknown"
     author = ("-c", "user.name=somebody", "-c", "user.email=somebody@localhost")
     for words in (("init", "-q"), (*author, "commit", "-q", "--allow-empty", "-m", "Begin")):
         subprocess.run(("git", *words), cwd=tmp_path, check=True)
     head = subprocess.run(("git", "rev-parse", "HEAD"), cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-    assert version.program_commit() == head[:12]
+    assert commit() == head[:12]
     (package / "_commit.txt").write_text("0123456789ab\n")
-    assert version.program_commit() == "0123456789ab"
+    assert commit() == "0123456789ab"
