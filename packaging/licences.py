@@ -11,10 +11,9 @@ import re
 import sys
 import sysconfig
 import tomllib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from importlib.metadata import Distribution, distribution
 from pathlib import Path
-from typing import NamedTuple
 
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 from packaging.requirements import Requirement
@@ -29,20 +28,16 @@ and the bundles hold no library under the GPL. HEIC is read by libheif and libde
 files of their own and can be replaced. The extra `export` is installed only where it is asked for: its encoders x264
 and x265 are under the GPL. Bundles carry all licence texts in one file. `make licences` makes this page, on Linux.
 """
-SPDX_OF_CLASSIFIER = {
-    "MIT License": "MIT",
-    "Apache Software License": "Apache-2.0",
-    "ISC License (ISCL)": "ISC",
-    "Python Software Foundation License": "PSF-2.0",
-}
-SPDX_OF_NAME = {"numba": "BSD-2-Clause", "protobuf": "BSD-3-Clause"}
+SPDX_OF_CLASSIFIER = {"MIT License": "MIT", "Apache Software License": "Apache-2.0", "ISC License (ISCL)": "ISC"}
+SPDX_OF_NAME = {"numba": "BSD-2-Clause", "protobuf": "BSD-3-Clause", "defusedxml": "PSF-2.0"}
 """Licences of the libraries that state theirs in no standard form, as their texts have them."""
-SOURCE_LABELS = "source", "source code", "repository", "github", "code", "homepage"
-TEXT_FILE = re.compile(r"licen[cs]e|copying|notice|third.?party", re.IGNORECASE)
+SOURCE_LABELS = "source", "source code", "repository", "homepage"
+TEXT_FILE = re.compile(r"(?i).*(licen[cs]e|copying|notice|third.?party)[^.]*(\.(txt|md|rst|thirdparty))?")
 STANDARD_TEXTS = {"Apache-2.0": ROOT / "LICENSE"}
+"""Licence texts of the libraries that come without one."""
 LIBRARY = re.compile(r"(?:lib)?(.+?)(?:-[0-9a-f]{8})*(?:-?\d+\.\d+)?\.(?:so|dylib|dll)(?:\.[\d.]+)?")
 """File name of a shared library; its group is the library's name."""
-EXTENSION = re.compile(r".+\.(?:cpython-\w[\w-]*|abi3)\.so|.+\.pyd|_?\w+\.\w*-?darwin\.so")
+EXTENSION = re.compile(r".+\.(?:cpython-\w[\w-]*|abi3)\.so|.+\.pyd")
 """File name of a Python extension, which has the licence of its package."""
 GPL = re.compile(r"A?GPL-[\d.]+(?:-only|-or-later)")
 """Licences that a plain installation must not hold; exceptions and alternatives make others of them."""
@@ -51,48 +46,32 @@ GPL_MARKS = (
     b"libreadline.", b"libgdbm.", b"libxvidcore.", b"libpostproc.", b"libfftw3", b"liq_attr_create", b"--enable-gpl",
 )  # fmt: skip
 """Bytes in shared libraries that hold GPL code or are linked with it."""
-
-
-class NativeLibrary(NamedTuple):
-    """Native libraries that wheels or bundles hold: licence (SPDX) and address of their source.
-
-    within: library that they are compiled into, "" for files of their own.
-    """
-
-    names: str
-    licence: str
-    source: str
-    within: str
-
-
-with (HERE / "native-libraries.csv").open(encoding="utf-8", newline="") as table:
-    NATIVE_LIBRARIES = tuple(NativeLibrary(**row) for row in csv.DictReader(table))
-SHARED_LIBRARIES = {name: row for row in NATIVE_LIBRARIES if not row.within for name in row.names.split()}
-"""The native libraries that are files of their own, by their names without "lib", hash and version."""
+NATIVE_LIBRARIES = list(csv.DictReader((HERE / "native-libraries.csv").read_text("utf-8").splitlines()))
+"""Native libraries in wheels and bundles; `within` names the library that they are compiled into, if there is one."""
+SHARED_LIBRARIES = {name: row for row in NATIVE_LIBRARIES if not row["within"] for name in row["names"].split()}
+"""Native libraries that are files, by their names without "lib", hash and version."""
 
 
 def distributions(extra: str = "") -> dict[str, Distribution]:
     """Return what pyproject.toml requires and what that requires, by name; of an extra, all that it adds."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    plain = _closure(project["dependencies"], {})
-    return _closure(project["optional-dependencies"][extra], plain) if extra else plain
+    plain = _closure(project["dependencies"])
+    if not extra:
+        return plain
+    return {name: lib for name, lib in _closure(project["optional-dependencies"][extra]).items() if name not in plain}
 
 
-def _closure(requirements: Iterable[str], known: dict[str, Distribution]) -> dict[str, Distribution]:
-    found: dict[str, Distribution] = {}
+def _closure(requirements: Iterable[str]) -> dict[str, Distribution]:
+    libraries: dict[str, Distribution] = {}
     waiting = list(requirements)
     while waiting:
         requirement = Requirement(waiting.pop())
         name = canonicalize_name(requirement.name)
-        if name in known or name in found or not _is_needed(requirement):
-            continue
-        found[name] = distribution(name)
-        waiting += found[name].requires or ()
-    return dict(sorted(found.items()))
-
-
-def _is_needed(requirement: Requirement) -> bool:
-    return requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+        is_needed = requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+        if is_needed and name not in libraries:
+            libraries[name] = distribution(name)
+            waiting += libraries[name].requires or ()
+    return dict(sorted(libraries.items()))
 
 
 def licence_of(name: str, library: Distribution) -> str:
@@ -118,29 +97,27 @@ def source_of(library: Distribution) -> str:
 
 def shared_libraries(library: Distribution) -> list[Path]:
     """Return the files of a distribution that are shared libraries or extensions."""
-    return [Path(str(library.locate_file(file))) for file in library.files or () if _is_shared(file.name)]
+    return [Path(str(library.locate_file(file))) for file in library.files or () if native_name(file.name) is not None]
 
 
-def _is_shared(name: str) -> bool:
-    return bool(EXTENSION.fullmatch(name) or LIBRARY.fullmatch(name))
-
-
-def native_name(path: Path) -> str:
-    """Return the name of a shared library without hash and version, "" for a Python extension."""
-    match = LIBRARY.fullmatch(path.name)
-    return "" if match is None or EXTENSION.fullmatch(path.name) else match[1]
+def native_name(file: str) -> str | None:
+    """Return the name of a shared library without hash and version, "" for a Python extension, None for other files."""
+    if EXTENSION.fullmatch(file):
+        return ""
+    match = LIBRARY.fullmatch(file)
+    return match and match[1]
 
 
 def faults(files: Iterable[Path]) -> Iterator[str]:
     """Yield a sentence about each shared library that is unknown or holds code under the GPL."""
     for path in sorted(files):
-        name, content = native_name(path), path.read_bytes()
-        native = SHARED_LIBRARIES.get(name)
+        name, content = native_name(path.name), path.read_bytes()
+        licence = SHARED_LIBRARIES.get(name, {}).get("licence", "")
         marks = [mark.decode() for mark in GPL_MARKS if mark in content]
-        if name and native is None:
+        if name and not licence:
             yield f"{path}: is not in packaging/native-libraries.csv; add {name!r} with its licence and source"
-        elif native is not None and GPL.fullmatch(native.licence):
-            yield f"{path}: is under {native.licence}; a plain installation must not hold it"
+        elif GPL.fullmatch(licence):
+            yield f"{path}: is under {licence}; a plain installation must not hold it"
         elif marks:
             yield f"{path}: holds code under the GPL, or is linked with it ({', '.join(marks)})"
 
@@ -157,18 +134,19 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def _native_rows(libraries: Collection[Distribution]) -> list[tuple[str, ...]]:
+def _native_rows(libraries: Iterable[Distribution]) -> list[tuple[str, ...]]:
     """Return a row for each project whose native libraries these hold, as files or compiled in."""
     rows = []
     for library in libraries:
-        files = {native_name(path): path.name for path in sorted(shared_libraries(library))}  # of links, the longest
-        for native in NATIVE_LIBRARIES:
-            if native.within == library.name:
-                rows.append((native.names, f"{library.name}, compiled in", native.licence, native.source))
-            held = [files[name] for name in native.names.split() if name in files and not native.within]
+        files = {
+            native_name(path.name): path.name for path in sorted(shared_libraries(library))
+        }  # of links, the longest
+        for names, licence, source, within in map(dict.values, NATIVE_LIBRARIES):
+            held = [re.sub(r"-[0-9a-f]{8}", "", files[name]) for name in names.split() if name in files and not within]
             if held:
-                names = re.sub(r"-[0-9a-f]{8}", "", ", ".join(held))
-                rows.append((names, library.name, native.licence, native.source))
+                rows.append((", ".join(held), library.name, licence, source))
+            elif within == library.name:
+                rows.append((names, f"{library.name}, compiled in", licence, source))
     return sorted(rows, key=lambda row: row[0].lower())
 
 
@@ -179,37 +157,26 @@ def _table(title: str, head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -
 
 def texts() -> str:
     """Return the licence texts of a plain installation, of Python and of the native libraries."""
-    parts = [_heading("iibr", (ROOT / "LICENSE").read_text("utf-8"))]
-    parts += [_texts_of(name, library) for name, library in distributions().items()]
-    python = Path(sysconfig.get_path("stdlib"), "LICENSE.txt")
-    files = [*([python] if python.is_file() else []), *sorted((HERE / "licence-texts").iterdir())]
-    rows = [", ".join(native) for native in NATIVE_LIBRARIES if not GPL.fullmatch(native.licence)]
-    parts.append(_heading("Native libraries: names, licence, source, library that holds them", "\n".join(rows)))
-    parts += [_heading(file.stem if file != python else "Python", file.read_text("utf-8")) for file in files]
-    return "\n".join(parts)
+    rows = [", ".join(native.values()) for native in NATIVE_LIBRARIES if not GPL.fullmatch(native["licence"])]
+    parts = {"iibr": (ROOT / "LICENSE").read_text("utf-8")}
+    parts |= dict(_text_of(name, library) for name, library in distributions().items())
+    parts["Native libraries: names, licence, source, library that holds them"] = "\n".join(rows)
+    for file in [*Path(sysconfig.get_path("stdlib")).glob("LICENSE.txt"), *sorted((HERE / "licence-texts").iterdir())]:
+        parts[file.stem.replace("LICENSE", "Python")] = file.read_text("utf-8")
+    line = "=" * 80
+    return "\n".join(f"{line}\n{title}\n{line}\n\n{text}\n" for title, text in parts.items())
 
 
-def _texts_of(name: str, library: Distribution) -> str:
-    """Return a library's licence texts, after the names in its bill of materials."""
-    licence = licence_of(name, library)
-    files = [library.locate_file(file) for file in library.files or ()]
-    found = [Path(str(file)).read_text("utf-8", "replace") for file in files if _is_text(file)]
-    if not found:
-        found = [STANDARD_TEXTS[licence].read_text("utf-8")]
-    bills = [json.loads(Path(str(file)).read_text("utf-8")) for file in files if "sboms" in str(file)]
+def _text_of(name: str, library: Distribution) -> tuple[str, str]:
+    """Return a heading and a library's licence texts, after the names in its bill of materials."""
+    licence, files = licence_of(name, library), [Path(str(library.locate_file(file))) for file in library.files or ()]
+    found = [file for file in files if TEXT_FILE.fullmatch(file.name)] or [STANDARD_TEXTS[licence]]
+    bills = [json.loads(file.read_text("utf-8")) for file in files if "sboms" in file.parts]
     components = [part for bill in bills for part in bill.get("components", ()) if part.get("scope") != "optional"]
     names = ", ".join(f"{part['name']} {part.get('version') or ''}".strip() for part in components)
     held = f"Compiled in: {names}.\n\n" if components else ""
-    return _heading(f"{library.name} {library.version}, {licence}, {source_of(library)}", held + "\n".join(found))
-
-
-def _is_text(file: object) -> bool:
-    path = Path(str(file))
-    return TEXT_FILE.search(path.name) is not None and path.suffix in ("", ".txt", ".md", ".rst", ".thirdparty")
-
-
-def _heading(title: str, text: str) -> str:
-    return f"{'=' * 80}\n{title}\n{'=' * 80}\n\n{text}\n"
+    text = held + "\n".join(file.read_text("utf-8", "replace") for file in found)
+    return f"{library.name} {library.version}, {licence}, {source_of(library)}", text
 
 
 def main() -> int:
@@ -224,7 +191,7 @@ def main() -> int:
     if options.texts:
         options.texts.write_text(texts(), "utf-8")
     if options.check:
-        files = [path for path in options.check.rglob("*") if path.is_file() and _is_shared(path.name)]
+        files = [path for path in options.check.rglob("*") if native_name(path.name) is not None and path.is_file()]
         found = list(faults(files)) if files else [f"{options.check}: holds no shared library; name another folder"]
         sys.stderr.writelines(f"{fault}\n" for fault in found)
         return bool(found)
