@@ -16,33 +16,28 @@ MIN_NEW_COLORS = 5000
 """Smallest number of colours among the changed pixels: a photo has more, an empty window and its panel have fewer."""
 
 
-def screen() -> np.ndarray:
-    """Return the screen's pixels [rows, columns, RGB]."""
-    return np.asarray(ImageGrab.grab().convert("RGB"))
-
-
-def shows_photo(before: np.ndarray, now: np.ndarray) -> bool:
+def shows_photo(before: Image.Image, now: Image.Image) -> bool:
     """Return whether a photo is on the screen that was not there before."""
-    changed = now[(now != before).any(axis=-1)]
-    return len(np.unique(changed, axis=0)) >= MIN_NEW_COLORS
+    pixels, former = np.asarray(now.convert("RGB")), np.asarray(before.convert("RGB"))
+    return len(np.unique(pixels[(pixels != former).any(axis=-1)], axis=0)) >= MIN_NEW_COLORS
 
 
-def main(picture: str, *command: str) -> str:
+def main(picture: Path, *command: str) -> str:
     """Return what went wrong, "" if nothing did."""
-    before, start = screen(), time.monotonic()
+    before = now = ImageGrab.grab()
+    end = time.monotonic() + LIMIT_S
     with subprocess.Popen(command) as program:
-        try:
-            while program.poll() is None and not shows_photo(before, screen()) and time.monotonic() < start + LIMIT_S:
-                time.sleep(1)
-            Path(picture).parent.mkdir(parents=True, exist_ok=True)
-            now = screen()
-            Image.fromarray(now).save(picture)
-            if program.poll() is not None:
-                return f"{command[0]} ended by itself with code {program.returncode}"
-            return "" if shows_photo(before, now) else f"no photo on the screen after {LIMIT_S} s: see {picture}"
-        finally:
-            program.terminate()
+        while program.poll() is None and not shows_photo(before, now) and time.monotonic() < end:
+            time.sleep(1)
+            now = ImageGrab.grab()
+        code = program.poll()
+        program.terminate()
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    now.save(picture)
+    if code is not None:
+        return f"{command[0]} ended by itself with code {code}"
+    return "" if shows_photo(before, now) else f"no photo on the screen after {LIMIT_S} s: see {picture}"
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]) or 0)
+    sys.exit(main(Path(sys.argv[1]), *sys.argv[2:]) or 0)

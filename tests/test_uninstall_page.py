@@ -16,7 +16,7 @@ from iibr_core.depth.models.catalog import own_models_folder
 from iibr_core.runtime import kernels
 from viewer.app.clipboard import copied_path
 from viewer.app.preferences_store import user_folder
-from viewer.app.session_store import sessions_folder
+from viewer.app.session_store import SESSIONS_FOLDER
 from viewer.entry import log_file
 
 PAGE = Path(__file__).parents[1] / "docs" / "uninstall.md"
@@ -36,7 +36,7 @@ def test_the_page_names_every_folder_of_the_user(
     monkeypatch.setattr(os, "access", lambda *_: False)  # as where root installed the program
     used = [
         user_folder(),
-        sessions_folder(user_folder()),
+        user_folder() / SESSIONS_FOLDER,
         own_models_folder(),
         cache_folder(),
         copied_path().parent,

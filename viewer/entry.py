@@ -18,8 +18,6 @@ GC_THRESHOLDS = 100_000, 20, 100
 """Thresholds of Python's garbage collector. Its usual ones, from 700 objects on, cost 0.3 s during imports."""
 TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
 """Environment variable that asks for the traceback of an unexpected error on stderr."""
-WINDOW_COMMANDS = "open", "view", "demo"
-"""Commands that open a window."""
 
 
 def command() -> None:
@@ -83,10 +81,9 @@ def _enter_bundle() -> None:
     """Give child programs the system's libraries instead of the bundle's. A worker process works, and ends here."""
     import multiprocessing
 
-    libraries = os.environ.pop("LD_LIBRARY_PATH_ORIG", "")  # what PyInstaller replaced
     os.environ.pop("LD_LIBRARY_PATH", None)
-    if libraries:
-        os.environ["LD_LIBRARY_PATH"] = libraries
+    if "LD_LIBRARY_PATH_ORIG" in os.environ:  # what PyInstaller replaced
+        os.environ["LD_LIBRARY_PATH"] = os.environ.pop("LD_LIBRARY_PATH_ORIG")
     multiprocessing.freeze_support()
 
 
@@ -126,7 +123,7 @@ def _is_started_from_desktop() -> bool:
     """Return whether a menu or file manager opened a window, without a terminal that shows stderr."""
     word = "".join(sys.argv[1:2])
     if sys.stderr is None:
-        return not word or word in WINDOW_COMMANDS or os.path.exists(word)
+        return not word or word in ("open", "view", "demo") or os.path.exists(word)
     return word == "open" and not any(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
 
 

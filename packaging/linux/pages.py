@@ -14,14 +14,15 @@ from datetime import UTC, datetime
 from email.utils import format_datetime
 from pathlib import Path
 from subprocess import check_output
+from textwrap import indent
 from typing import Any
 
 import typer
 
 from viewer.cli.main import app
 
-ROOT = Path(__file__).resolve().parents[2]
-HERE = ROOT / "packaging" / "linux"
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 METAINFO = "io.github.iibr.iibr.metainfo.xml"
 MAINTAINER = "The iibr project <iibr@users.noreply.github.com>"
 
@@ -31,32 +32,20 @@ def main(folder: Path) -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     seconds = check_output(["git", "log", "-1", "--format=%ct"], cwd=ROOT, text=True)
     time = datetime.fromtimestamp(int(seconds), UTC)
+    record = (HERE / METAINFO).read_text("utf-8").replace("@VERSION@", version).replace("@DATE@", f"{time:%Y-%m-%d}")
+    pages = {"iibr.1": manual_page(version, time), "changelog": debian_changelog(version, time)}
     folder.mkdir(parents=True, exist_ok=True)
-    _write_compressed(folder / "iibr.1.gz", manual_page(version, time))
-    changes = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    _write_compressed(folder / "changelog.gz", debian_changelog(changes, version, time))
-    (folder / METAINFO).write_text(metainfo(version, time), "utf-8")
+    (folder / METAINFO).write_text(record, "utf-8")
+    for name, text in pages.items():
+        (folder / f"{name}.gz").write_bytes(gzip.compress(text.encode(), mtime=0))
 
 
-def _write_compressed(path: Path, text: str) -> None:
-    path.write_bytes(gzip.compress(text.encode(), mtime=0))
-
-
-def metainfo(version: str, time: datetime) -> str:
-    """Return the AppStream record with the version and its day."""
-    return (HERE / METAINFO).read_text("utf-8").replace("@VERSION@", version).replace("@DATE@", f"{time:%Y-%m-%d}")
-
-
-def debian_changelog(markdown: str, version: str, time: datetime) -> str:
+def debian_changelog(version: str, time: datetime) -> str:
     """Return the newest section of the changelog in Debian's form."""
-    newest = markdown.split("\n## ")[1].partition("\n")[2]
-    marked = newest.replace("\n- ", "\n* ")
-    lines = [f"  {line}".rstrip() for line in re.sub(r"### (.*)", r"[ \1 ]", marked).strip().splitlines()]
-    return (
-        f"iibr ({version}) stable; urgency=medium\n\n"
-        + "\n".join(lines)
-        + (f"\n\n -- {MAINTAINER}  {format_datetime(time)}\n")
-    )
+    newest = (ROOT / "CHANGELOG.md").read_text("utf-8").split("\n## ")[1].partition("\n")[2]
+    marked = re.sub(r"### (.*)", r"[ \1 ]", newest.replace("\n- ", "\n* "))
+    lines = indent(marked.strip(), "  ")
+    return f"iibr ({version}) stable; urgency=medium\n\n{lines}\n\n -- {MAINTAINER}  {format_datetime(time)}\n"
 
 
 def manual_page(version: str, time: datetime) -> str:

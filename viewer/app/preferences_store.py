@@ -43,8 +43,7 @@ def load_preferences(state: AppState, folder: Path) -> AppState:
     recent, more = _read(folder / RECENT_FILE, state.recent, "The list of recent files is empty.")
     last, opened = (path if os.path.isdir(path) else "" for path in (kept.last_folder, kept.opened_folder))
     font_scale, head_cm = clamp(kept.font_scale, *FONT_SCALE_LIMITS), clamp(kept.head_range_cm, *HEAD_RANGE_LIMITS)
-    kept = replace(kept, font_scale=font_scale, head_range_cm=head_cm)
-    kept = replace(kept, last_folder=last, opened_folder=opened)
+    kept = replace(kept, font_scale=font_scale, head_range_cm=head_cm, last_folder=last, opened_folder=opened)
     return replace(state, preferences=kept, recent=recent[:MAX_RECENT], notices=(*state.notices, *damage, *more))
 
 

@@ -23,6 +23,8 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
 
+SESSIONS_FOLDER = "sessions"
+"""Name of the folder of sessions within that of the user's settings."""
 QUIET_S = 2.0
 """Time without changes after which a session is written, in seconds."""
 MAX_SESSIONS = 1000
@@ -35,7 +37,7 @@ class SessionStore:
 
     def __init__(self, folder: Path | None, wake: Callable[[], None]) -> None:
         """folder: of the user's settings; None keeps nothing. wake: called, in the thread, when a session was read."""
-        self._folder = None if folder is None else sessions_folder(folder)
+        self._folder = None if folder is None else folder / SESSIONS_FOLDER
         self._wake = wake
         self._executor = ThreadPoolExecutor(1, "iibr-sessions")
         self._scene: Scene | None = None
@@ -103,11 +105,6 @@ class SessionStore:
         is_new, self._has_failed = not self._has_failed, self._has_failed or error is not None
         text = f"{error} Your changes are not kept for the next time."
         return [do(messages.notify, Notice(text))] if error is not None and is_new else []
-
-
-def sessions_folder(folder: Path) -> Path:
-    """Return the folder of sessions within that of the user's settings."""
-    return folder / "sessions"
 
 
 def key_of(source: Source) -> str:

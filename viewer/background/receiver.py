@@ -34,13 +34,12 @@ class Receiver:
         self._received: deque[tuple[str, ...]] = deque(maxlen=1)
         self._is_closed = False
         self._address = ""
-        self._thread: threading.Thread | None = None
+        self._thread = threading.Thread(target=self._serve, name="iibr-receiver", daemon=True)
 
     def listen(self) -> None:
         """Begin to listen, unless another window does or there is no place for a socket."""
         self._address = window_address() or ""
         if self._address:
-            self._thread = threading.Thread(target=self._serve, name="iibr-receiver", daemon=True)
             self._thread.start()
 
     def take(self) -> tuple[str, ...] | None:
@@ -50,13 +49,10 @@ class Receiver:
     def close(self) -> None:
         """Stop listening. A sender that holds the thread up is not waited for."""
         self._is_closed = True
-        if self._thread is not None and self._thread.is_alive():
-            threading.Thread(target=self._wake_thread, daemon=True).start()
+        if self._thread.is_alive():
+            with suppress(OSError):
+                Client(self._address).close()  # wakes the thread
             self._thread.join(CLOSE_S)
-
-    def _wake_thread(self) -> None:
-        with suppress(OSError):
-            Client(self._address).close()
 
     def _serve(self) -> None:
         with suppress(OSError), _only_listener(self._address), Listener(self._address, backlog=BACKLOG) as listener:

@@ -28,7 +28,6 @@ def _gl_version() -> str:
         context = create_headless()
     except InputError as error:
         return f"unavailable: {error}"
-    try:
-        return f"{context.version}, {context.renderer}"
-    finally:
-        context.release()
+    words = f"{context.version}, {context.renderer}"
+    context.release()
+    return words

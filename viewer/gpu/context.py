@@ -77,14 +77,12 @@ def usual_backends(platform: str) -> tuple[str, ...]:
 
 def _create(name: str) -> GLContext:
     settings: dict[str, Any] = {"backend": "egl"} if name == "egl" else {}
-    remedy = (
-        "install libegl1, libgl1 and libgl1-mesa-dri" if name == "egl" else "install the driver of the graphics card"
-    )
+    remedy = "libegl1, libgl1 and libgl1-mesa-dri" if name == "egl" else "the driver of the graphics card"
     try:
         return GLContext(moderngl.create_context(require=330, standalone=True, **settings), name)
     except Exception as error:  # the loader raises plain Exception for every failure
         reason = str(error).partition("\n")[0]
-        raise InputError(f"{name}: {reason} ({remedy})") from error
+        raise InputError(f"{name}: {reason} (install {remedy})") from error
 
 
 def create_for_window(window: Any) -> GLContext:

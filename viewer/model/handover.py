@@ -42,11 +42,7 @@ def paths_from_message(message: bytes) -> tuple[str, ...] | None:
     """Return the paths in a message, None if it is none: it may come from any program of the user."""
     try:
         paths = json.loads(message)
-        is_valid = isinstance(paths, list) and len(paths) <= MAX_PATHS and all(map(_is_path, paths))
+        are_paths = all(os.path.isabs(path) and b"\0" not in os.fsencode(path) for path in paths)
     except (ValueError, TypeError, RecursionError):
         return None
-    return tuple(paths) if is_valid else None
-
-
-def _is_path(path: str) -> bool:
-    return os.path.isabs(path) and b"\0" not in os.fsencode(path)
+    return tuple(paths) if are_paths and isinstance(paths, list) and len(paths) <= MAX_PATHS else None

@@ -13,6 +13,7 @@ COMMIT_FILE = PACKAGE / "_commit.txt"
 UNKNOWN = "unknown"
 
 
+@cache
 def program_version() -> str:
     """Return the version, which only `pyproject.toml` states."""
     return version("iibr")
@@ -35,7 +36,7 @@ def program_commit() -> str:
 @cache
 def program_licence() -> str:
     """Return the licence as an SPDX expression."""
-    return "".join(metadata("iibr").get_all("License-Expression") or ())
+    return metadata("iibr")["License-Expression"]
 
 
 @cache

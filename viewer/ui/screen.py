@@ -56,13 +56,8 @@ def build_screen(
     actions = []
     if woven_texture is None:  # each eye sees half of a stereo picture: nothing lies over it unasked
         actions = filmstrip(state, layout, thumbnails) + chips(state, layout) + panel_handle(state, layout)
-    return (
-        actions
-        + panel(state, layout)
-        + welcome(state, layout, thumbnails)
-        + notices(state, layout)
-        + prompts(state, layout)
-    )
+    actions += panel(state, layout) + welcome(state, layout, thumbnails)
+    return actions + notices(state, layout) + prompts(state, layout)
 
 
 def _image(texture: int, corners: tuple[float, float, float, float]) -> None:

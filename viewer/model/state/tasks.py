@@ -19,8 +19,8 @@ class PlainTask:
 
     copy: put the picture, at the size of the views, into the system's clipboard. paste: open the picture that is there,
     or the path of one. find display: show the scene on the one that Looking Glass Bridge knows. read facts: those
-    that a photo's file states. find recent: look which recent files exist. A stopped
-    download is continued by the next one.
+    that a photo's file states. find recent: look which recent files exist. A stopped download is continued by the
+    next one.
     """
 
     kind: PlainKind

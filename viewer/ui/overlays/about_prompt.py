@@ -19,9 +19,10 @@ def about_prompt() -> list[Action]:
     quiet("The program never looks for a newer version by itself.")
     gap()
     pages = program_pages()
-    offers = {
-        "Look for a newer version": pages.get("Releases"),
-        "Libraries and licences": f"{pages['Documentation']}/licences.md" if "Documentation" in pages else None,
-    }
-    shown = [(words, do(ask, ShowFileTask(page))) for words, page in offers.items() if page]
-    return button_rows([*shown, ("Close", do(messages.show_prompt, None))])
+    return button_rows(
+        [
+            ("Look for a newer version", do(ask, ShowFileTask(pages["Releases"]))),
+            ("Libraries and licences", do(ask, ShowFileTask(f"{pages['Documentation']}/licences.md"))),
+            ("Close", do(messages.show_prompt, None)),
+        ]
+    )
