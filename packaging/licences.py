@@ -55,10 +55,8 @@ SHARED_LIBRARIES = {name: row for row in NATIVE_LIBRARIES if not row["within"] f
 def distributions(extra: str = "") -> dict[str, Distribution]:
     """Return what pyproject.toml requires and what that requires, by name; of an extra, all that it adds."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    plain = _closure(project["dependencies"])
-    if not extra:
-        return plain
-    return {name: lib for name, lib in _closure(project["optional-dependencies"][extra]).items() if name not in plain}
+    plain, extras = _closure(project["dependencies"]), project["optional-dependencies"]
+    return {name: lib for name, lib in _closure(extras[extra]).items() if name not in plain} if extra else plain
 
 
 def _closure(requirements: Iterable[str]) -> dict[str, Distribution]:
@@ -76,9 +74,8 @@ def _closure(requirements: Iterable[str]) -> dict[str, Distribution]:
 
 def licence_of(name: str, library: Distribution) -> str:
     """Return a library's licence as an SPDX expression. Raises LookupError if it is unknown."""
-    metadata = library.metadata
-    stated = [metadata.get("License-Expression"), SPDX_OF_NAME.get(name), metadata.get("License")]
-    classified = [text.split(" :: ")[-1] for text in metadata.get_all("Classifier") or ()]
+    stated = [library.metadata.get("License-Expression"), SPDX_OF_NAME.get(name), library.metadata.get("License")]
+    classified = [text.split(" :: ")[-1] for text in library.metadata.get_all("Classifier") or ()]
     for text in [*stated, *map(SPDX_OF_CLASSIFIER.get, classified)]:
         try:
             return str(canonicalize_license_expression(text or ""))
@@ -89,10 +86,9 @@ def licence_of(name: str, library: Distribution) -> str:
 
 def source_of(library: Distribution) -> str:
     """Return the address of a library's source, or of its page."""
-    pairs = [text.split(", ", 1) for text in library.metadata.get_all("Project-URL") or ()]
-    addresses = {label.lower(): address for label, address in pairs}
-    labelled = (addresses[label] for label in SOURCE_LABELS if label in addresses)
-    return next(labelled, library.metadata.get("Home-page") or "")
+    pairs = (text.partition(", ") for text in library.metadata.get_all("Project-URL") or ())
+    addresses = {label.lower(): address for label, _, address in pairs}
+    return next(filter(None, map(addresses.get, SOURCE_LABELS)), library.metadata.get("Home-page") or "")
 
 
 def shared_libraries(library: Distribution) -> list[Path]:

@@ -25,8 +25,8 @@ WIDTH, WIDTH_ALONE, MIN_WIDTH = 600.0, 360.0, 160.0
 CELL_WIDTH = 130.0
 """Width of a recent photo, in window units at usual size: about, as a row is filled."""
 MIN_IN_ROW, MAX_IN_ROW = 2, 4
-HEADING, HEADING_SIZE = "Drop a photo here", 1.4
-"""Words of the heading, and their size relative to the usual text."""
+HEADING_SIZE = 1.4
+"""Size of the heading relative to the usual text."""
 OFFERS = ("Open a photo…", "Open a folder…", "See the demo")
 """Names of the commands that the page offers."""
 
@@ -40,15 +40,14 @@ def welcome(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnail 
     """Build the page where the picture will be, while nothing is open or being read and no prompt is shown."""
     if not _is_shown(state):
         return []
-    window = layout.window
+    window, room = layout.window, layout.panel.x or layout.window.width
     usual, least = (WIDTH if state.recent else WIDTH_ALONE) * scale(), min(MIN_WIDTH * scale(), window.width)
-    width = max(min(usual, (layout.panel.x or window.width) - 2 * MARGIN), least)
-    middle = imgui.ImVec2(max(layout.panel.x or window.width, width) / 2, window.height / 2)
-    imgui.set_next_window_pos(middle, 0, imgui.ImVec2(0.5, 0.5))
+    width = max(min(usual, room - 2 * MARGIN), least)
+    imgui.set_next_window_pos(imgui.ImVec2(max(room, width) / 2, window.height / 2), 0, imgui.ImVec2(0.5, 0.5))
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, window.height))
     imgui.begin("welcome", None, CARD_FLAGS)
     imgui.push_font(imgui.get_font(), HEADING_SIZE * imgui.get_style().font_size_base)
-    imgui.text_wrapped(HEADING)
+    imgui.text_wrapped("Drop a photo here")
     imgui.pop_font()
     gap()
     actions = button_rows([(name, BY_NAME[name].action(state)) for name in OFFERS])
@@ -71,13 +70,12 @@ def _recent(state: AppState, thumbnails: Mapping[str, Thumbnail | None]) -> list
     gap(6)
     quiet("Recent")
     actions: list[Action] = []
-    space, room = GAP * scale(), imgui.get_content_region_avail().x
+    start, space, room = imgui.get_cursor_screen_pos(), GAP * scale(), imgui.get_content_region_avail().x
     in_row = min(max(round(room / (CELL_WIDTH * scale())), MIN_IN_ROW), MAX_IN_ROW)
     width = (room - (in_row - 1) * space) / in_row
-    start = imgui.get_cursor_screen_pos()
+    height = width / CELL_ASPECT
     for i, (path, name) in enumerate(zip(paths, opening.names_of(paths))):
         row, column = divmod(i, in_row)
-        height = width / CELL_ASPECT
         cell = Rect(start.x + column * (width + space), start.y + row * (height + space), width, height)
         if photo_cell(cell, name, thumbnails.get(path), palette, tip=path):
             actions.append(do(opening.open_source, Source(path)))
