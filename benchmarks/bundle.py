@@ -1,14 +1,12 @@
 """Compare the bundle with the checkout: time to the window and to its first picture, on a private X server.
 
-    python -m benchmarks bundle [--rounds 7]
+    python -m benchmarks bundle
 
-Both open the demo photo, in turns; times count from the start of the program, ratios are medians over the rounds. Also
-printed: sizes of the .deb and of the bundle. `make deb` writes both.
+Both open the demo photo, in turns; times count from the start of the program, ratios are medians over the rounds.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -25,34 +23,27 @@ from iibr_core.types import InputError
 from tests.xvfb import private_display
 
 ROOT = Path(__file__).parents[1]
-BUNDLE, PACKAGES = ROOT / "out" / "bundle" / "iibr", "dist/iibr_*.deb"
-PROGRAMS = {"bundle": [str(BUNDLE / "iibr")], "checkout": [sys.executable, "-P", "-m", "viewer"]}
+BUNDLE = ROOT / "out" / "bundle" / "iibr" / "iibr"
+PROGRAMS = [str(BUNDLE)], [sys.executable, "-P", "-m", "viewer"]
 MIN_COLORS = 1000
 """Number of colours on the screen from which on it shows a photo; an empty window has fewer."""
 POLL_S = 0.01
+ROUNDS = 7
 DEADLINE_S = 60
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=7)
-    rounds = parser.parse_args().rounds
-    packages = sorted(ROOT.glob(PACKAGES))
-    if not packages or not BUNDLE.exists():
-        raise InputError("there is no bundle: run `make deb` first")
-    times: dict[str, list[tuple[float, float]]] = {name: [] for name in PROGRAMS}
+    if not BUNDLE.exists():
+        raise InputError("there is no bundle: run `make bundle` first")
     with private_display(), tempfile.TemporaryDirectory() as home:
-        for _ in range(rounds + 1):
-            for name, command in PROGRAMS.items():
-                times[name].append(time_of([*command, "demo"], home))
-    used = subprocess.run(["du", "-sm", str(BUNDLE)], capture_output=True, text=True, check=True).stdout.split()[0]
-    rows = [("size of the .deb", f"{packages[-1].stat().st_size / 1e6:.0f} MB"), ("size of the bundle", f"{used} MB")]
-    bundle, checkout = (np.array(times[name][1:]) for name in ("bundle", "checkout"))  # the first round fills caches
-    for k, what in enumerate(("window", "first picture")):
-        ratio = np.median(bundle[:, k] / checkout[:, k])
-        medians = f"{np.median(bundle[:, k]):.2f} s, checkout {np.median(checkout[:, k]):.2f} s"
-        rows.append((what, f"{medians}: {ratio:.2f} times"))
+        # (round, program, moment); the first round fills caches
+        times_s = np.array([[time_of([*command, "demo"], home) for command in PROGRAMS] for _ in range(ROUNDS + 1)][1:])
+    (bundle, checkout), ratios = np.median(times_s, axis=0), np.median(times_s[:, 0] / times_s[:, 1], axis=0)
+    rows = [
+        (moment, f"{bundle[k]:.2f} s, checkout {checkout[k]:.2f} s: {ratios[k]:.2f} times")
+        for k, moment in enumerate(("window", "first picture"))
+    ]
     print(markdown(("what", "measured"), rows))
 
 

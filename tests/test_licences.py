@@ -3,7 +3,7 @@
 import runpy
 import subprocess
 import sys
-from importlib.metadata import distribution
+from importlib.metadata import Distribution, distribution
 from pathlib import Path
 
 import pytest
@@ -58,9 +58,8 @@ def test_a_bundle_is_judged_by_its_shared_libraries(tmp_path: Path, name: str, c
 def test_the_page_and_the_texts_hold_each_library(tmp_path: Path) -> None:
     done = run("--output", tmp_path / "page.md", "--texts", tmp_path / "texts.txt")
     assert done.returncode == 0, done.stderr
-    page, committed, texts = (
-        path.read_text("utf-8") for path in (tmp_path / "page.md", ROOT / "docs/licences.md", tmp_path / "texts.txt")
-    )
+    files = tmp_path / "page.md", ROOT / "docs/licences.md", tmp_path / "texts.txt"
+    page, committed, texts = (file.read_text("utf-8") for file in files)
     plain = [library.name for library in LICENCES["distributions"]().values()]
     extra = [library.name for library in LICENCES["distributions"]("export").values()]
     assert set(extra) == {"av", "pillow_heif"}
@@ -73,10 +72,7 @@ def test_the_page_and_the_texts_hold_each_library(tmp_path: Path) -> None:
 
 
 def test_an_unknown_licence_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "odd-1.dist-info").mkdir()
-    (tmp_path / "odd-1.dist-info" / "METADATA").write_text(
-        "Metadata-Version: 2.1\nName: odd\nVersion: 1\nLicense: mine\n"
-    )
-    (library,) = distribution("pip").discover(path=[str(tmp_path)])
+    (tmp_path / "METADATA").write_text("Name: odd\nLicense: mine\n")
+    library = Distribution.at(tmp_path)
     with pytest.raises(LookupError, match="odd: its licence is unknown"):
         LICENCES["licence_of"]("odd", library)

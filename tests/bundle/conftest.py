@@ -14,15 +14,11 @@ import pillow_heif
 import pytest
 from PIL import Image
 
-from tests.bundle.desktop import Desktop
-from tests.bundle.systems import SYSTEMS, CleanSystem
+from tests.bundle.systems import SYSTEMS, CleanSystem, clean_system
 from tests.iibr_core.depth.onnx_graphs import weighing
-from tests.xvfb import x_server
+from tests.xvfb import private_display
 
 CHECKOUT = Path(__file__).parents[2]
-DEMO = CHECKOUT / "assets" / "motorcycle"
-CACHE = CHECKOUT / "out" / "chroots"
-"""Folder of base systems and of packages that were downloaded for them."""
 
 
 def package(ending: str) -> Path:
@@ -33,23 +29,20 @@ def package(ending: str) -> Path:
 
 
 @pytest.fixture(scope="session")
-def desktop() -> Iterator[Desktop]:
-    """A screen for all windows, one after the other."""
-    with x_server() as name:
-        yield Desktop(name)
+def display() -> Iterator[None]:
+    """A screen for all windows; DISPLAY names it."""
+    with private_display():
+        yield
 
 
 @pytest.fixture(scope="session", params=SYSTEMS)
-def system(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, desktop: Desktop
-) -> Iterator[CleanSystem]:
+def system(request: pytest.FixtureRequest, display: None) -> Iterator[CleanSystem]:
     """A system with the package installed."""
-    clean = CleanSystem(request.param, tmp_path_factory.mktemp(request.param), CACHE, desktop.display).unpack()
-    assert not list((clean.folder / "usr/bin").glob("python*"))
-    clean.install(str(package("deb")))
-    fill(clean.photos)
-    yield clean
-    shutil.rmtree(clean.folder)
+    with clean_system(request.param) as clean:
+        shutil.copy(package("deb"), clean.folder / "tmp" / "iibr.deb")
+        clean.install("/tmp/iibr.deb")
+        fill(clean.photos)
+        yield clean
 
 
 @dataclass(frozen=True)
@@ -57,38 +50,28 @@ class Checkout:
     """The program of this checkout, run in a folder of photos by a user who never ran it before."""
 
     photos: Path
-    display: str
-
-    def run(self, *words: str) -> None:
-        """Run a command."""
-        subprocess.run(self._words(words), cwd=self.photos, env=self._environment(), check=True)
 
     def start(self, *words: str) -> subprocess.Popen[bytes]:
         """Start a command."""
-        return subprocess.Popen(self._words(words), cwd=self.photos, env=self._environment())
-
-    def _words(self, words: tuple[str, ...]) -> list[str]:
-        return [sys.executable, "-P", "-m", "viewer", *words]
-
-    def _environment(self) -> dict[str, str]:
         names = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "XDG_RUNTIME_DIR")
-        home = dict.fromkeys(names, str(self.photos / "home"))
-        return {**os.environ, **home, "DISPLAY": self.display, "PYTHONPATH": str(CHECKOUT)}
+        environment = {**os.environ, **dict.fromkeys(names, str(self.photos / "home")), "PYTHONPATH": str(CHECKOUT)}
+        return subprocess.Popen([sys.executable, "-P", "-m", "viewer", *words], cwd=self.photos, env=environment)
 
 
 @pytest.fixture(scope="session")
-def checkout(desktop: Desktop, tmp_path_factory: pytest.TempPathFactory) -> Checkout:
+def checkout(display: None, tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """The program of this checkout."""
     folder = tmp_path_factory.mktemp("checkout")
     (folder / "home").mkdir(mode=0o700)
     fill(folder)
-    return Checkout(folder, desktop.display)
+    return Checkout(folder)
 
 
 def fill(folder: Path) -> None:
-    """Write a JPEG, a HEIC, a folder of three photos and a depth model into a folder that everybody may write to."""
-    with Image.open(DEMO / "motorcycle.png") as demo:
-        photo = demo.convert("RGB").resize((480, 320))
+    """Write the demo, a JPEG, a HEIC, a folder of three photos and a depth model into a folder for everybody."""
+    demo = shutil.copytree(CHECKOUT / "assets" / "motorcycle", folder / "demo") / "motorcycle.png"
+    with Image.open(demo) as picture:
+        photo = picture.convert("RGB").resize((480, 320))
     photo.save(folder / "phone.jpg", quality=95)
     pillow_heif.from_pillow(photo).save(folder / "phone.heic", quality=90)
     (folder / "three").mkdir()

@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tarfile
 import tomllib
 import zipfile
 from importlib.metadata import Distribution, PathDistribution
@@ -24,11 +23,8 @@ from viewer.model.version import program_commit
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 REPOSITORY = "https://github.com/iibr/iibr"
-SITES = (
-    f"{REPOSITORY}/blob/v{PROJECT['version']}/",
-    f"https://raw.githubusercontent.com/iibr/iibr/v{PROJECT['version']}/",
-)
-"""Addresses of a file of the repository at this version, and of its contents."""
+SITES = f"{REPOSITORY}/blob/", "https://raw.githubusercontent.com/iibr/iibr/"
+"""Addresses of the repository's files, and of their contents."""
 FAKE_COMPILER = """
 import pathlib, sys
 folder = pathlib.Path(sys.argv[1])
@@ -47,30 +43,28 @@ def run(*words: object, cwd: Path = ROOT, **environment: str) -> str:
     return done.stdout + done.stderr
 
 
-def build_wheel(source: Path, target: Path, **environment: str) -> Path:
-    run("hatchling", "build", "-t", "wheel", "-d", target, cwd=source, **environment)
-    (wheel,) = target.glob("*.whl")
-    return wheel
+def build(source: Path, kind: str, target: Path, **environment: str) -> Path:
+    run("hatchling", "build", "-t", kind, "-d", target, cwd=source, **environment)
+    (package,) = target.glob("*.*")
+    return package
 
 
 @pytest.fixture(scope="module")
 def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sdist")
-    run("hatchling", "build", "-t", "sdist", "-d", folder)
-    return folder / f"iibr-{PROJECT['version']}.tar.gz"
+    return build(ROOT, "sdist", tmp_path_factory.mktemp("sdist"))
 
 
 @pytest.fixture(scope="module")
-def source(sdist: Path) -> Path:
+def source(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the unpacked source package."""
-    with tarfile.open(sdist) as archive:
-        archive.extractall(sdist.parent, filter="data")
-    return sdist.with_name(sdist.name.removesuffix(".tar.gz"))
+    folder = tmp_path_factory.mktemp("source")
+    shutil.unpack_archive(sdist, folder, filter="data")
+    return folder / f"iibr-{PROJECT['version']}"
 
 
 @pytest.fixture(scope="module")
 def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build_wheel(source, tmp_path_factory.mktemp("wheel"), HATCH_BUILD_NO_HOOKS="true")
+    return build(source, "wheel", tmp_path_factory.mktemp("wheel"), HATCH_BUILD_NO_HOOKS="true")
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +92,9 @@ def test_links_and_pictures_of_the_package_page_name_files_of_this_version(distr
     assert len(pictures) == 2
     assert len(links) > 10
     for address in (*pictures, *links):
-        site = SITES[address in pictures]
-        assert address.startswith(site)
-        assert (ROOT / address.removeprefix(site)).is_file(), address
+        site, file = address.split(f"v{PROJECT['version']}/")
+        assert site == SITES[address in pictures]
+        assert (ROOT / file).is_file(), address
     assert "pipx install iibr &&" in text
     assert "make run" not in text
 
@@ -134,7 +128,7 @@ def test_a_wheel_with_kernels_is_for_the_python_and_system_that_compiled_them(
 ) -> None:
     changed = shutil.copytree(source, tmp_path / "source")
     (changed / "viewer" / "precompile.py").write_text(compiler)
-    wheel = build_wheel(changed, tmp_path)
+    wheel = build(changed, "wheel", tmp_path / "dist")
     (tag,) = parse_wheel_filename(wheel.name)[3]
     assert tag in set(sys_tags())
     assert tag.interpreter == (f"cp{sys.version_info.major}{sys.version_info.minor}" if has_kernels else "py3")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -13,6 +13,7 @@ import pytest
 
 from tests.forked_iibr import run_forked
 from tests.viewer.conftest import DEADLINE_S, Opener, write_scene
+from viewer.model.handover import window_address
 
 OpenPhotos = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -23,19 +24,12 @@ def photos(tmp_path: Path) -> dict[str, Path]:
 
 
 @pytest.fixture
-def places(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, str]]:
-    """The user's folders and display, in the environment. A socket's path must be short."""
+def open_photos(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[OpenPhotos]:
+    """The user has new folders; a socket's path must be short. Without PATH there is no dialog to wait for a person."""
     with tempfile.TemporaryDirectory() as folder:
-        found = {"DISPLAY": display, "XDG_RUNTIME_DIR": folder, "XDG_CONFIG_HOME": str(tmp_path / "config")}
-        for name, value in found.items():
-            monkeypatch.setenv(name, value)
-        yield found
-
-
-@pytest.fixture
-def open_photos(places: dict[str, str], tmp_path: Path) -> OpenPhotos:
-    """The program has no path, and so no dialog that would wait for a person."""
-    return lambda *paths: run_forked("open", *paths, cwd=tmp_path, **places, PATH="")
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+        yield lambda *paths: run_forked("open", *paths, cwd=tmp_path, DISPLAY=display, PATH="")
 
 
 def test_later_starts_open_their_photos_in_the_window_that_is_there(
@@ -61,11 +55,9 @@ def window_of(title: str) -> str:
 
 
 def test_a_window_that_was_killed_is_not_waited_for(open_photos: OpenPhotos, photos: dict[str, Path]) -> None:
-    command = [sys.executable, "-P", "-m", "viewer", "open", photos["a"]]
-    with subprocess.Popen(command, env=os.environ) as killed:
-        window_of("^a - iibr$")
-        killed.kill()
-    with subprocess.Popen(command, env=os.environ) as program:
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(window_address() or "")
+    with subprocess.Popen([sys.executable, "-P", "-m", "viewer", "open", photos["a"]]) as program:
         try:
             window = window_of("^a - iibr$")
             assert program.poll() is None

@@ -44,19 +44,7 @@ def shown_focus(viewer: Driver, given: float) -> float:
 def icon_sizes(driver: Driver) -> list[int]:
     """Widths of the window's icons: X11 keeps for each its width, its height and its pixels."""
     window = str(glfw.get_x11_window(driver.app.window.handle))
-    words = [
-        "xprop",
-        "-id",
-        window,
-        "-notype",
-        "-len",
-        "100000",
-        "-f",
-        "_NET_WM_ICON",
-        "32c",
-        " = $0+\n",
-        "_NET_WM_ICON",
-    ]
+    words = f"xprop -id {window} -notype -len 100000 -f _NET_WM_ICON 32c _NET_WM_ICON".split()
     output = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     numbers, sizes = [int(word) for word in re.findall(r"\d+", output)], []
     while numbers:

@@ -9,7 +9,7 @@ import struct
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
 import pytest
@@ -34,10 +34,14 @@ def runtime_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def receiver() -> Iterator[Receiver]:
-    listening = Receiver(lambda: None)
-    listening.listen()
-    yield listening
-    listening.close()
+    with closing(listening()) as window:
+        yield window
+
+
+def listening() -> Receiver:
+    window = Receiver(lambda: None)
+    window.listen()
+    return window
 
 
 def hand_over_when_heard(*paths: str) -> None:
@@ -58,56 +62,31 @@ def test_the_latest_paths_are_received_once(receiver: Receiver) -> None:
 
 
 def test_one_of_two_windows_listens_and_another_one_after_it_although_a_killed_one_left_its_socket() -> None:
-    address = window_address()
-    assert address is not None
     with socket.socket(socket.AF_UNIX) as left:
-        left.bind(address)
-    windows = [Receiver(lambda: None), Receiver(lambda: None)]
-    for window in windows:
-        window.listen()
-    hand_over_when_heard("/a.png")
-    took = [window.take() for window in windows]
-    assert sorted(took, key=str) == [("/a.png",), None]
-    for window in windows:
-        window.close()
+        left.bind(window_address() or "")
+    with closing(listening()) as first, closing(listening()) as second:
+        hand_over_when_heard("/a.png")
+        assert sorted([first.take(), second.take()], key=str) == [("/a.png",), None]
     assert not hand_over(["/b.png"])
-    again = Receiver(lambda: None)
-    again.listen()
-    hand_over_when_heard("/b.png")
-    assert again.take() == ("/b.png",)
-    again.close()
+    with closing(listening()) as third:
+        hand_over_when_heard("/b.png")
+        assert third.take() == ("/b.png",)
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [
-        b"",
-        b"GET / HTTP/1.1\r\n\r\n",
-        SHORT.pack(100) + b"half",
-        SHORT.pack(MAX_BYTES + 1),
-        *(
-            SHORT.pack(len(text)) + text
-            for text in (
-                b"\x80\x04N.",
-                b"[" * 100_000,
-                b'{"/a.png": 1}',
-                b'["a.png"]',
-                b"[[]]",
-                b'["/\\ud800"]',
-                b'["/\\u0000"]',
-                json.dumps(["/a.png"] * (MAX_PATHS + 1)).encode(),
-            )
-        ),
-    ],
-    ids=lambda sent: repr(sent[:12]),
-)
+NOT_PATHS = b"\x80\x04N.", b"[" * 100_000, b'{"/a.png": 1}', b'["a.png"]', b"[[]]", b'["/\\ud800"]', b'["/\\u0000"]'
+MANY_PATHS = json.dumps(["/a.png"] * (MAX_PATHS + 1)).encode()
+MESSAGES = [SHORT.pack(len(text)) + text for text in (*NOT_PATHS, MANY_PATHS)]
+CUT_MESSAGE = SHORT.pack(100) + b"half"
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\n\r\n", CUT_MESSAGE, SHORT.pack(MAX_BYTES + 1), *MESSAGES])
 def test_other_bytes_change_nothing(receiver: Receiver, sent: bytes) -> None:
     hand_over_when_heard("/a.png")
     receiver.take()
     with socket.socket(socket.AF_UNIX) as stranger:
         stranger.connect(window_address() or "")
         stranger.sendall(sent)
-        if sent[4:] != b"half":
+        if sent != CUT_MESSAGE:
             stranger.shutdown(socket.SHUT_WR)
         with suppress(ConnectionResetError):  # not all of it was read
             assert stranger.recv(64) == b"", "it is answered by the end alone"
@@ -118,12 +97,10 @@ def test_other_bytes_change_nothing(receiver: Receiver, sent: bytes) -> None:
 
 def test_a_window_closes_although_senders_hold_it_up(receiver: Receiver) -> None:
     hand_over_when_heard("/a.png")
-    strangers = [socket.socket(socket.AF_UNIX) for _ in range(8)]
-    for stranger in strangers:
-        stranger.connect(window_address() or "")
-    receiver.close()
-    for stranger in strangers:
-        stranger.close()
+    with ExitStack() as strangers:
+        for _ in range(8):
+            strangers.enter_context(socket.socket(socket.AF_UNIX)).connect(window_address() or "")
+        receiver.close()
 
 
 def test_displays_have_their_own_windows_and_a_foreign_folder_has_none(monkeypatch: pytest.MonkeyPatch) -> None:

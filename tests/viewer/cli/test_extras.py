@@ -37,18 +37,15 @@ def run_plain(*commands: list[str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
 
 
-def test_viewing_needs_no_extra(photo_path: Path, tmp_path: Path) -> None:
-    output = str(tmp_path / "picture.png")
-    output_of(run_plain(["screenshot", str(photo_path), "--view", "1,0", "--size", "96x64", "-o", output]))
-
-
-def test_heic_photos_become_loops_and_pages_without_gpl_encoders(tmp_path: Path) -> None:
-    photo, exports = str(tmp_path / "photo.heic"), {kind: tmp_path / f"a.{kind}" for kind in ("gif", "webp")}
-    exports["web"] = tmp_path / "a.html"
+def test_heic_photos_are_viewed_and_become_loops_and_pages_without_an_extra(tmp_path: Path) -> None:
+    photo, files = str(tmp_path / "photo.heic"), {kind: tmp_path / f"a.{kind}" for kind in ("png", "gif", "webp")}
+    files["web"] = tmp_path / "a.html"
     pillow_heif.from_pillow(Image.radial_gradient("L").resize((96, 64)).convert("RGB")).save(photo)
     np.save(tmp_path / "photo_disparity.npy", np.linspace(-1, 1, 96 * 64, dtype=np.float32).reshape(64, 96))
-    output_of(run_plain(*(["export", photo, "--to", kind, "-o", str(path)] for kind, path in exports.items())))
-    assert all(path.stat().st_size > 1000 for path in exports.values())
+    commands = [["export", photo, "--grid", "3", "--to", kind, "-o", str(file)] for kind, file in files.items()]
+    commands[0] = ["screenshot", photo, "--view", "1,0", "--size", "96x64", "-o", str(files["png"])]
+    output_of(run_plain(*commands))
+    assert all(file.stat().st_size > 1000 for file in files.values())
 
 
 @pytest.mark.parametrize(
