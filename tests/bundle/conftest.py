@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pillow_heif
@@ -23,9 +22,9 @@ CHECKOUT = Path(__file__).parents[2]
 
 def package(ending: str) -> Path:
     """Return the newest package that `make deb` or `make rpm` has written."""
-    found = sorted((CHECKOUT / "dist").glob(f"iibr[_-]*.{ending}"), key=lambda path: path.stat().st_mtime)
-    assert found, f"no dist/iibr*.{ending}: run `make {ending}`"
-    return found[-1]
+    packages = list((CHECKOUT / "dist").glob(f"iibr[_-]*.{ending}"))
+    assert packages, f"no dist/iibr*.{ending}: run `make {ending}`"
+    return max(packages, key=lambda path: path.stat().st_mtime)
 
 
 @pytest.fixture(scope="session")
@@ -45,30 +44,24 @@ def system(request: pytest.FixtureRequest, display: None) -> Iterator[CleanSyste
         yield clean
 
 
-@dataclass(frozen=True)
-class Checkout:
-    """The program of this checkout, run in a folder of photos by a user who never ran it before."""
-
-    photos: Path
-
-    def start(self, *words: str) -> subprocess.Popen[bytes]:
-        """Start a command."""
-        names = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "XDG_RUNTIME_DIR")
-        environment = {**os.environ, **dict.fromkeys(names, str(self.photos / "home")), "PYTHONPATH": str(CHECKOUT)}
-        return subprocess.Popen([sys.executable, "-P", "-m", "viewer", *words], cwd=self.photos, env=environment)
-
-
 @pytest.fixture(scope="session")
-def checkout(display: None, tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """The program of this checkout."""
+def checkout(display: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of photos for the program of this checkout."""
     folder = tmp_path_factory.mktemp("checkout")
-    (folder / "home").mkdir(mode=0o700)
     fill(folder)
-    return Checkout(folder)
+    (folder / "home").mkdir(mode=0o700)
+    return folder
+
+
+def start(folder: Path, *words: str) -> subprocess.Popen[bytes]:
+    """Start the program of this checkout in a folder of photos, as a user who never ran it before."""
+    names = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "XDG_RUNTIME_DIR")
+    environment = {**os.environ, **dict.fromkeys(names, str(folder / "home")), "PYTHONPATH": str(CHECKOUT)}
+    return subprocess.Popen([sys.executable, "-P", "-m", "viewer", *words], cwd=folder, env=environment)
 
 
 def fill(folder: Path) -> None:
-    """Write the demo, a JPEG, a HEIC, a folder of three photos and a depth model into a folder for everybody."""
+    """Write the demo, a JPEG, a HEIC, three photos and a depth model into a folder for everybody."""
     demo = shutil.copytree(CHECKOUT / "assets" / "motorcycle", folder / "demo") / "motorcycle.png"
     with Image.open(demo) as picture:
         photo = picture.convert("RGB").resize((480, 320))

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from tests.bundle import desktop
-from tests.bundle.conftest import Checkout
+from tests.bundle.conftest import start
 from tests.bundle.systems import CleanSystem
 from tests.image_compare import ROUNDING, SAME_RASTERISER, assert_close, read_png
 
@@ -21,9 +21,9 @@ PICTURE = np.s_[:720, :960]
 
 
 @pytest.fixture(scope="module")
-def demo_window(checkout: Checkout) -> desktop.Picture:
+def demo_window(checkout: Path) -> desktop.Picture:
     """Return the window of the checkout that shows the demo."""
-    with desktop.window(checkout.start("demo"), "motorcycle - iibr") as program:
+    with desktop.window(start(checkout, "demo"), "motorcycle - iibr") as program:
         return desktop.settled(program)[PICTURE]
 
 
@@ -71,13 +71,13 @@ def test_another_start_opens_its_photo_in_the_window_that_is_there(system: Clean
 @pytest.mark.parametrize(
     "words", ["demo/motorcycle.png --view 1,-2 --aperture 2", "phone.heic", "phone.jpg --depth-model ./sum.onnx"]
 )
-def test_screenshots_equal_the_checkouts(system: CleanSystem, checkout: Checkout, tmp_path: Path, words: str) -> None:
+def test_screenshots_equal_the_checkouts(system: CleanSystem, checkout: Path, tmp_path: Path, words: str) -> None:
     name = f"shot-{words.replace('/', '')}.png"
     command = ["screenshot", *words.split(), "--grid", "5", "-o", name]
     system.run("iibr", *command, user="ann")
-    if not (checkout.photos / name).exists():
-        assert checkout.start(*command).wait() == 0
-    assert_close(read_png(system.photos / name), read_png(checkout.photos / name), ROUNDING, tmp_path, system.name)
+    if not (checkout / name).exists():
+        assert start(checkout, *command).wait() == 0
+    assert_close(read_png(system.photos / name), read_png(checkout / name), ROUNDING, tmp_path, system.name)
 
 
 def test_two_processes_export_three_photos(system: CleanSystem) -> None:
