@@ -262,7 +262,7 @@ def _run_pool(processes: int, waiting: deque[PhotoTask]) -> Generator[Outcome, N
     except BrokenProcessPool:
         return list(running.values())
     finally:
-        for process in set(active_children()).difference(others):
+        for process in set(active_children()).difference(others) if running else ():
             process.kill()  # after Ctrl-C they are still in work
         executor.shutdown()
     return []
