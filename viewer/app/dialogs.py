@@ -62,10 +62,10 @@ def show_error(message: str) -> None:
 
 
 def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:
-    """Open the dialog for a file or folder, in the folder that holds `beside`."""
+    """Open the dialog for a file or folder, in the folder that holds `beside`, or is it if a separator ends it."""
     from imgui_bundle import portable_file_dialogs as dialogs
 
-    folder = os.path.dirname(os.path.abspath(os.path.expanduser(beside)))
+    folder = os.path.abspath(os.path.dirname(os.path.expanduser(beside)))
     start = os.path.join(folder, "") if beside else ""
     title, endings = CHOICES[what][0], CHOICES[what][1].split()
     if not endings:

@@ -17,13 +17,15 @@ from viewer.model.state.prompts import ChoiceOf, ExportPrompt, SavePrompt
 PLACE = SavePrompt("photos/one-iibr.png", ScreenSize(3, 2))
 
 
+@pytest.mark.parametrize("beside", ["photos/one.jpg", "photos/", "~/photos/"])
 @pytest.mark.parametrize(("what", "kind"), [("photo", "open_file"), ("folder", "select_folder")])
 def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(
-    monkeypatch: pytest.MonkeyPatch, what: ChoiceOf, kind: str
+    monkeypatch: pytest.MonkeyPatch, what: ChoiceOf, kind: str, beside: str
 ) -> None:
+    monkeypatch.setenv("HOME", os.getcwd())
     asked: list[tuple[object, ...]] = []
     monkeypatch.setattr(portable_file_dialogs, kind, lambda *words: asked.append(words))
-    ask_for_path(what, "photos/one.jpg")
+    ask_for_path(what, beside)
     _, start, *filters = asked[0]
     assert start == os.path.join(os.getcwd(), "photos", "")
     for patterns in filters:
