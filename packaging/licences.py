@@ -134,9 +134,8 @@ def _native_rows(libraries: Iterable[Distribution]) -> list[tuple[str, ...]]:
     """Return a row for each project whose native libraries these hold, as files or compiled in."""
     rows = []
     for library in libraries:
-        files = {
-            native_name(path.name): path.name for path in sorted(shared_libraries(library))
-        }  # of links, the longest
+        # Of links to one library, the last and longest name counts.
+        files = {native_name(path.name): path.name for path in sorted(shared_libraries(library))}
         for names, licence, source, within in map(dict.values, NATIVE_LIBRARIES):
             held = [re.sub(r"-[0-9a-f]{8}", "", files[name]) for name in names.split() if name in files and not within]
             if held:

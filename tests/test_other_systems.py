@@ -1,4 +1,4 @@
-"""What Windows lacks is used behind a guard: read from the sources, because the tests run on Linux."""
+"""Functions that Windows lacks are used behind a guard: read from the sources, because the tests run on Linux."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GUARD = re.compile(r"os\.name|sys\.platform|hasattr\((os|signal|socket)|except (
 
 
 def unguarded(source: str) -> list[str]:
-    """What a module uses of UNIX_ONLY, in functions and outside of them, with no guard before it."""
+    """Return the uses of UNIX_ONLY in a module, in functions and outside of them, with no guard before them."""
     if UNIX_ONLY.search(source) is None:
         return []
     tree, uses = ast.parse(source), []

@@ -1,4 +1,4 @@
-"""The window's ear: receives the paths that later starts of the program hand over, see `viewer.model.handover`."""
+"""Receives, for the window, the paths that later starts of the program hand over, see `viewer.model.handover`."""
 
 from __future__ import annotations
 
