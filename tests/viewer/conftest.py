@@ -105,6 +105,11 @@ def rests(app: App) -> bool:
     return app.wait_s == main_loop.IDLE_WAIT_S
 
 
+def has_all_views(state: AppState) -> bool:
+    """Whether all views are there, made with the newest settings: progress is that of the views before until then."""
+    return state.progress.is_complete and state.shown_generation == state.generation
+
+
 @dataclass
 class Driver:
     """A viewer in a window, its loop turned by the test, its mouse and keys moved by the X server."""
@@ -121,7 +126,7 @@ class Driver:
     def until_idle(self) -> None:
         """Turn the loop until every view is there and nothing is left to do; what was sent before is heard first."""
         self.app.step()
-        self.until(lambda app: app.state.progress.is_complete and rests(app))
+        self.until(lambda app: has_all_views(app.state) and rests(app))
 
     def send(self, *words: object) -> None:
         """Let xdotool do something."""
