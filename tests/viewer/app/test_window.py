@@ -131,6 +131,8 @@ def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer: Driver) -> None:
 
 def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_one_edit(viewer: Driver) -> None:
     app, before = viewer.app, viewer.image()
+    viewer.until(lambda app: None not in (app.state.facts, app.state.folder) and bool(app.state.models.known))
+    viewer.until_idle()
     shown, drawn = app.frames_shown, app.scene_view.pictures_drawn
     for _ in range(50):
         glfw.post_empty_event()

@@ -134,7 +134,7 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
     def cost_of(action: Action) -> tuple[bool, ...]:
         before = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         app.do(action)
-        viewer.until(lambda app: app.scene_view.generation == app.state.generation)
+        viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
         viewer.until_idle()
         after = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         return tuple(a != b for a, b in zip(before, after))
