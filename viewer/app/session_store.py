@@ -57,7 +57,8 @@ class SessionStore:
             return actions
         if self._scene is None or self._scene.source is not scene.source:
             self._save()
-            self._scene, self._saved, self._latest = scene, None, None
+            self._scene = scene
+            self._saved = self._latest = settings_of(state.at_rest, scene.size)
             self._search = self._executor.submit(_read, self._folder, scene.source)
             self._search.add_done_callback(lambda _: self._wake())
         elif self._search is None and state.stroke is None:
@@ -94,8 +95,10 @@ class SessionStore:
             settings = search.result()
         except InputError as error:
             return [do(messages.notify, Notice(str(error)))]
-        is_open = state.scene is not None and state.scene.source is self._scene.source
-        return [do(opening.restore_session, settings)] if is_open and settings is not None else []
+        if settings is None or state.scene is None or state.scene.source is not self._scene.source:
+            return []
+        self._saved = None  # the restored settings are the ones that need not be written
+        return [do(opening.restore_session, settings)]
 
     def _report_failure(self) -> list[Action]:
         """Return a notice for the first session that cannot be written."""
@@ -103,7 +106,7 @@ class SessionStore:
         self._writes = [write for write in self._writes if not write.done()]
         error = next((error for error in errors if error is not None), None)
         is_new, self._has_failed = not self._has_failed, self._has_failed or error is not None
-        text = f"{error} Your changes are not kept for the next time."
+        text = f"Your changes are not kept for the next time. {error}."
         return [do(messages.notify, Notice(text))] if error is not None and is_new else []
 
 

@@ -6,7 +6,7 @@ import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from threading import current_thread, main_thread
+from threading import Event, current_thread, main_thread
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener, rests
+from tests.viewer.conftest import DEADLINE_S, Driver, Opener, rests
 from viewer.app.session_store import key_of
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
@@ -81,6 +81,22 @@ def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window: Opener, pho
     second.app.do(do(history.undo))
     second.until_idle()
     assert second.app.state.depth.edits == UNEDITED
+
+
+def test_what_is_changed_while_the_session_is_looked_for_is_kept(
+    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_look = Event()
+
+    def late_key(source: Source) -> str:
+        may_look.wait(DEADLINE_S)
+        return key_of(source)
+
+    monkeypatch.setattr("viewer.app.session_store.key_of", late_key)
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    change(driver)
+    may_look.set()
+    driver.until(lambda app: bool(sessions_in(tmp_path / "kept")))
 
 
 def test_a_session_belongs_to_a_file_as_it_is_now(photo_path: Path, tmp_path: Path) -> None:
