@@ -13,6 +13,8 @@ class Remedy(Enum):
 
     REPLACE = auto()
     """Replace the output that exists, or choose another name."""
+    PLACE = auto()
+    """Write to another place."""
     SMALLER = auto()
     """Make fewer or smaller views."""
     DEPTH = auto()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.outputs import write_file
+from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import ImageSize, InputError
 
 VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
@@ -83,7 +84,7 @@ def _write_video(
     except UnknownCodecError as error:
         raise InputError(f"{path}: PyAV here has no encoder {codec}; write .gif or .webp") from error
     except av.error.FFmpegError as error:
-        raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another place") from error
+        raise FixableError(f"{path}: cannot be written ({reason_of(error)})", Remedy.PLACE) from error
 
 
 def _write_pictures(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> None:

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import psutil
 
 from iibr_core.formats.files import reason_of
-from iibr_core.remedies import FixableError, Remedy
+from iibr_core.remedies import FixableError, Remedy, remedy_of
 from iibr_core.types import InputError
 
 TEMPORARY = f".iibr-{platform.node()}-"
@@ -60,7 +60,7 @@ def check_output_folder(
     real = _resolve(folder)
     above = next(place for place in (real, *real.parents) if place.exists())
     if not above.is_dir():
-        raise InputError(f"{folder}: {above} is a file, not a folder; choose another place")
+        raise FixableError(f"{folder}: {above} is a file, not a folder", Remedy.PLACE)
     _require_writable(folder, above)
     inputs = tuple(inputs)
     _require_outside(folder, real, inputs)
@@ -78,7 +78,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be created ({reason_of(error)}); choose another place") from error
+        raise FixableError(f"{folder}: cannot be created ({reason_of(error)})", Remedy.PLACE) from error
 
 
 def remove_leftovers(folder: Path) -> None:
@@ -125,9 +125,9 @@ def _beside(path: Path, real: Path) -> Iterator[Path]:
         message = str(error)
         if TEMPORARY not in message:
             raise
-        raise InputError(f"{path}: {message.partition(': ')[2]}") from error
+        raise FixableError(f"{path}: {message.partition(': ')[2]}", remedy_of(error)) from error
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another place") from error
+        raise FixableError(f"{path}: cannot be written ({reason_of(error)})", Remedy.PLACE) from error
 
 
 def _exchange(new: Path, place: Path, old: Path) -> None:
@@ -151,7 +151,7 @@ def _resolve(path: Path) -> Path:
 
 def _require_writable(path: Path, folder: Path) -> None:
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: the folder {folder} may not be written to; choose another place")
+        raise FixableError(f"{path}: the folder {folder} may not be written to", Remedy.PLACE)
 
 
 def _require_outside(path: Path, real: Path, inputs: Iterable[Path]) -> None:
@@ -160,7 +160,7 @@ def _require_outside(path: Path, real: Path, inputs: Iterable[Path]) -> None:
         if read.exists() and real.exists() and real.samefile(read):
             raise InputError(f"{path}: is an input ({read}), which is never overwritten; choose another name")
         if read.is_dir() and _resolve(read) in (real, *real.parents):
-            raise InputError(f"{path}: lies in the input {read}, where nothing is written; choose another place")
+            raise FixableError(f"{path}: lies in the input {read}, where nothing is written", Remedy.PLACE)
 
 
 def _require_own_files(folder: Path, real: Path, own_files: str) -> None:

@@ -77,7 +77,7 @@ class PreferencesKeeper:
         try:
             store_preferences(state, self._folder)
         except InputError as error:
-            text = f"Settings and recent photos are not kept. {str(error).partition(';')[0]}."
+            text = f"Settings and recent photos are not kept. {error}."
             return [do(messages.notify, Notice(text, is_error=True))]
         return []
 

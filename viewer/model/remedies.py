@@ -9,6 +9,7 @@ DEPTH_COMMANDS = ("Depth models…", "Open a depth map…")
 BETTER_DEPTH = "A depth map or a depth model is more accurate."
 WORDS = {
     Remedy.REPLACE: "choose another name",
+    Remedy.PLACE: "choose another place",
     Remedy.SMALLER: "open a smaller copy of the photo",
     Remedy.DEPTH: "get it, or open a depth map",
     Remedy.DOWNLOAD: "try again later, or choose a model file",

@@ -25,7 +25,8 @@ from iibr_core.formats.images.metadata import PictureMetadata, exif_for, number_
 from iibr_core.formats.images.picture_kinds import BEST_QUALITY, PNG_SETTINGS, PictureFormat
 from iibr_core.formats.images.pillow_reader import EXIF_FOLDER
 from iibr_core.formats.images.xmp import xmp_for
-from iibr_core.types import ColorSpace, InputError, image_size
+from iibr_core.remedies import FixableError, Remedy
+from iibr_core.types import ColorSpace, image_size
 
 FINE_COLOR_QUALITY = 90
 """Quality from which JPEG and AVIF keep colour as finely as light."""
@@ -98,9 +99,9 @@ def write_by_oiio(
     # Writing to an output that did not open crashes OpenImageIO.
     if target is None or not (target.open(name, spec) and target.write_image(values) and target.close()):
         reason = reason_of(complaint_of(oiio if target is None else target))
-        raise InputError(f"cannot be written ({reason}); choose another place")
+        raise FixableError(f"cannot be written ({reason})", Remedy.PLACE)
     if not _is_whole(path, spec.height):
-        raise InputError("cannot be written whole (is the disk full?); choose another place")
+        raise FixableError("cannot be written whole (is the disk full?)", Remedy.PLACE)
 
 
 def _is_whole(path: Path, height: int) -> bool:

@@ -24,6 +24,7 @@ from iibr_core.formats.images.picture_kinds import (
     require_picture_format,
 )
 from iibr_core.formats.outputs import write_file
+from iibr_core.remedies import FixableError, remedy_of
 from iibr_core.types import SRGB, ColorSpace, InputError, image_size
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def _errors_naming(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise FixableError(f"{path}: {error}", remedy_of(error)) from error
     except (ValueError, RuntimeError, struct.error, MemoryError) as error:
         raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another kind of file") from error
 
