@@ -6,6 +6,7 @@ python -P packaging/linux/pages.py FOLDER
 from __future__ import annotations
 
 import gzip
+import os
 import re
 import sys
 import tomllib
@@ -24,20 +25,25 @@ from viewer.cli.main import app
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 METAINFO = "io.github.iibr.iibr.metainfo.xml"
+COMMIT_TIME = ("git", "log", "-1", "--format=%ct")
 MAINTAINER = "The iibr project <iibr@users.noreply.github.com>"
 
 
 def main(folder: Path) -> None:
     """Write all pages into a folder."""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
-    seconds = check_output(["git", "log", "-1", "--format=%ct"], cwd=ROOT, text=True)
-    time = datetime.fromtimestamp(int(seconds), UTC)
+    time = datetime.fromtimestamp(int(source_date()), UTC)
     record = (HERE / METAINFO).read_text("utf-8").replace("@VERSION@", version).replace("@DATE@", f"{time:%Y-%m-%d}")
     pages = {"iibr.1": manual_page(version, time), "changelog": debian_changelog(version, time)}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / METAINFO).write_text(record, "utf-8")
     for name, text in pages.items():
         (folder / f"{name}.gz").write_bytes(gzip.compress(text.encode(), mtime=0))
+
+
+def source_date() -> str:
+    """Return the time of the sources in seconds since 1970: SOURCE_DATE_EPOCH, or else that of the last commit."""
+    return os.environ.get("SOURCE_DATE_EPOCH") or check_output(COMMIT_TIME, cwd=ROOT, text=True)
 
 
 def debian_changelog(version: str, time: datetime) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
-from tests.bundle.conftest import CHECKOUT, package
+from tests.bundle.conftest import CHECKOUT, fill, package
+from tests.bundle.systems import clean_system
 
 MAX_DEB_MB, MAX_INSTALLED_MB = 120, 360
 GLIBC = re.compile(r"\bGLIBC_(\d+)\.(\d+)\b")
@@ -63,3 +66,17 @@ def test_the_rpm_holds_the_same_files_and_needs_no_python(unpacked: Path, tmp_pa
     needs = output("rpm", "-qp", "--requires", package("rpm"))
     assert "libEGL.so.1" in needs
     assert "python" not in needs
+
+
+def test_the_rpm_can_be_installed_used_and_removed(display: None) -> None:
+    needs = output("dpkg-deb", "-f", package("deb"), "Depends").split(", ")
+    with clean_system("trixie") as system:
+        fill(system.photos)
+        shutil.copy(package("rpm"), system.folder / "tmp" / "iibr.rpm")
+        system.install("rpm", *(name.split()[0] for name in needs))
+        system.run("rpm", "--install", "--nodeps", "/tmp/iibr.rpm")  # rpm does not know what Debian's packages bring
+        system.run("iibr", "screenshot", "phone.jpg", "-o", "drawn.png", user="ann")
+        with Image.open(system.photos / "drawn.png") as drawn:
+            assert drawn.size == (480, 320)
+        system.run("rpm", "--erase", "iibr")
+        assert not list(system.folder.glob("usr/**/iibr*"))
