@@ -26,18 +26,20 @@ BACKLOG = 16
 
 
 class Receiver:
-    """Call it from the window's thread. Only the window that listens first receives; only the latest paths are kept."""
+    """Call it from the window's thread. One window receives; when it closes, another does. Only the latest paths are
+    kept.
+    """
 
     def __init__(self, wake: Callable[[], None]) -> None:
         """wake: called, in the thread, when paths were received."""
         self._wake = wake
         self._received: deque[tuple[str, ...]] = deque(maxlen=1)
-        self._is_closed = False
+        self._is_closed = self._is_listening = False
         self._address = ""
         self._thread = threading.Thread(target=self._serve, name="iibr-receiver", daemon=True)
 
     def listen(self) -> None:
-        """Begin to listen, unless another window does or there is no place for a socket."""
+        """Begin to listen, as soon as no other window does; never if there is no place for a socket."""
         self._address = window_address() or ""
         if self._address:
             self._thread.start()
@@ -49,13 +51,14 @@ class Receiver:
     def close(self) -> None:
         """Stop listening. A sender that holds the thread up is not waited for."""
         self._is_closed = True
-        if self._thread.is_alive():
+        if self._is_listening:
             with suppress(OSError):
                 Client(self._address).close()  # wakes the thread
             self._thread.join(CLOSE_S)
 
     def _serve(self) -> None:
         with suppress(OSError), _only_listener(self._address), Listener(self._address, backlog=BACKLOG) as listener:
+            self._is_listening = True
             while not self._is_closed:
                 with listener.accept() as connection:
                     self._receive(connection)
@@ -71,16 +74,16 @@ class Receiver:
 
 @contextmanager
 def _only_listener(address: str) -> Iterator[None]:
-    """Be the only process that listens at an address, and remove the socket that a killed window left.
+    """Be the only window that listens at an address, once no other does; remove the socket that a killed one left.
 
-    Raises OSError if another process listens. The system frees the lock when the process ends; on Windows the pipe is
-    a lock of its own.
+    The system frees the lock when the process ends. On Windows the pipe is a lock of its own: it raises OSError while
+    another process listens.
     """
     if sys.platform == "win32":
         yield
         return
     with open(f"{address}.lock", "ab") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(lock, fcntl.LOCK_EX)
         with suppress(FileNotFoundError):
             os.unlink(address)
         yield
