@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -13,6 +14,7 @@ from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_camera_view import FreeCameraView
+from viewer.app.interruption import interruptions
 from viewer.app.keys import actions_from_keys, read_keys
 from viewer.app.pace import DIALOG_LOOK_S, IDLE_WAIT_S, NoticeClock, Pace
 from viewer.app.pointer import NO_POINTER, Pointer, actions_from_hover, actions_from_pointer, read_pointer
@@ -87,9 +89,9 @@ class App:
         self._drawn_at = 0.0
         self.do(do(ask, PlainTask("find recent")))
 
-    def run(self) -> None:
-        """Show frames until the user quits."""
-        while not self.state.should_quit:
+    def run(self, signals: Sequence[int]) -> None:
+        """Show frames until the user quits or one of these signals came, see `interruptions`."""
+        while not (self.state.should_quit or signals):
             self.step()
 
     def step(self) -> None:
@@ -267,10 +269,10 @@ class App:
 
 def run(state: AppState, kept_in: Path | None = None, *actions: Action) -> None:
     """Open the window on this state, take actions, and show it until the user quits. Raises InputError."""
-    with closing(App(state, kept_in)) as app:
+    with interruptions() as signals, closing(App(state, kept_in)) as app:
         app.receiver.listen()
         app.do(*actions)
-        app.run()
+        app.run(signals)
 
 
 def initial_state(source: Source, depth_strength: float = 1.0) -> AppState:

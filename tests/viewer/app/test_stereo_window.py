@@ -211,7 +211,7 @@ def test_the_command_line_begins_with_it(
     (tmp_path / "visual.json").write_text(json.dumps(CALIBRATION))
     monkeypatch.chdir(tmp_path)
 
-    def look(app: App) -> None:
+    def look(app: App, signals: list[int]) -> None:
         Driver(app).until(lambda app: app.stereo_screen.view.drawn is not None)
         shown.append((app.stereo_screen.view.drawn, app.stereo_screen.second))
 
