@@ -97,7 +97,7 @@ def slow_errors(evidence, side, distance, known):
             chance = max(misled, labels.MIXED_SHARES[s] if k == 0 else 0)
             share = contradicted(side == s, distance == k, expected=misled)
             here = known & (side == s) & (distance == k)
-            is_told = (np.abs(evidence[here]) > VOTE).mean() >= labels.MIN_CLEAR_SHARE
+            is_told = here.any() and (np.abs(evidence[here]) > VOTE).mean() >= labels.MIN_CLEAR_SHARE
             share = share - chance if is_told and misled <= labels.MIN_CLEAR_SHARE * share else 0
             share /= max(1 - misled - chance, 0.1)
             wrong[s, k] = np.clip(share, labels.UNLIKELY, 1 - labels.UNLIKELY)
