@@ -9,7 +9,6 @@ import gzip
 import os
 import re
 import sys
-import tomllib
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from email.utils import format_datetime
@@ -21,6 +20,7 @@ from typing import Any
 import typer
 
 from viewer.cli.main import app
+from viewer.model.version import program_version
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -31,8 +31,7 @@ MAINTAINER = "The iibr project <iibr@users.noreply.github.com>"
 
 def main(folder: Path) -> None:
     """Write all pages into a folder."""
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
-    time = datetime.fromtimestamp(int(source_date()), UTC)
+    version, time = program_version(), datetime.fromtimestamp(int(source_date()), UTC)
     record = (HERE / METAINFO).read_text("utf-8").replace("@VERSION@", version).replace("@DATE@", f"{time:%Y-%m-%d}")
     pages = {"iibr.1": manual_page(version, time), "changelog": debian_changelog(version, time)}
     folder.mkdir(parents=True, exist_ok=True)
