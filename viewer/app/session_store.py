@@ -97,7 +97,7 @@ class SessionStore:
             return [do(messages.notify, Notice(str(error)))]
         if settings is None or state.scene is None or state.scene.source is not self._scene.source:
             return []
-        self._saved = None  # the restored settings are the ones that need not be written
+        self._saved = self._latest = None  # what is restored counts as written, once it is shown
         return [do(opening.restore_session, settings)]
 
     def _report_failure(self) -> list[Action]:

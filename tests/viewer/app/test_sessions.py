@@ -19,7 +19,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import DEADLINE_S, Driver, Opener, rests
-from viewer.app.session_store import key_of
+from viewer.app.session_store import SessionStore, key_of
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
@@ -97,6 +97,27 @@ def test_what_is_changed_while_the_session_is_looked_for_is_kept(
     change(driver)
     may_look.set()
     driver.until(lambda app: bool(sessions_in(tmp_path / "kept")))
+
+
+def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(
+    open_window: Opener, photo_path: Path, tmp_path: Path
+) -> None:
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    change(first)
+    first.until(lambda app: bool(sessions_in(tmp_path / "kept")) and rests(app))
+    first.app.close()
+    (session,) = sessions_in(tmp_path / "kept")
+    kept = session.read_text("utf-8")
+    driver = open_window(photo_path, grid=ONE)
+    driver.until_idle()
+    state, other = driver.app.state, Source(str(tmp_path / "other.png"))
+    assert state.scene is not None
+    store = SessionStore(tmp_path / "kept", lambda: None)
+    while not store.run(state):
+        driver.app.step()
+    store.run(replace(state, source=other, scene=replace(state.scene, source=other)))
+    store.close(state)
+    assert session.read_text("utf-8") == kept
 
 
 def test_a_session_belongs_to_a_file_as_it_is_now(photo_path: Path, tmp_path: Path) -> None:
