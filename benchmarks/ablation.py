@@ -21,7 +21,7 @@ import torch
 
 from benchmarks.compare import changes_table, chosen_scenes, command_line, compare
 from benchmarks.scenes import Scene
-from benchmarks.ways import ViewMaker
+from benchmarks.ways import MakeView
 from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.weights import save_weights
 from iibr_core.method.ambiguous_rays import COVERAGE, INPAINTED, LANDS, PARALLAX, PLAIN, SHARE, UNCOVERED, AmbiguousRays
@@ -115,7 +115,7 @@ def train_missing(folder: Path, steps: int) -> None:
         save_weights(run.model, variant.weights_in(folder))
 
 
-def views_by(variant: Variant | None, weights: TrainedWeights | None, scene: Scene, shares: bool = True) -> ViewMaker:
+def views_by(variant: Variant | None, weights: TrainedWeights | None, scene: Scene, shares: bool = True) -> MakeView:
     """Return views decided by a transformer, None for the closed form. shares: all views show what one inpainted."""
 
     def transformer(ambiguous: AmbiguousRays) -> FloatImage:

@@ -31,9 +31,9 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.method.ambiguous_rays import find_ambiguous_rays
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form
+from iibr_core.method.light_field import ViewMaker
 from iibr_core.method.look_up import look_up
 from iibr_core.method.occlusion import FULLY_COVERED, MIN_COVERED, view_entropy
-from iibr_core.method.photo_views import PhotoViews
 from iibr_core.method.plan import plan_for_viewing
 from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.view import Renderer, View
@@ -68,8 +68,8 @@ class Steps:
         self.photo, self.disparity = demo.photo.pixels, plan.field_disparity(demo.disparity).values
         field, self.reach = offsets_of(plan.grid), plan.grid.centre[0]
         self.corner, self.beside = ViewOffset(-self.reach, -self.reach), ViewOffset(0.0, self.reach)
-        self.complete = PhotoViews(self.photo, self.disparity, field)
-        self.rays = PhotoViews(self.photo, self.disparity, field, stages_without(["share-inpainted"])).rays
+        self.complete = ViewMaker(self.photo, self.disparity, field)
+        self.rays = ViewMaker(self.photo, self.disparity, field, stages=stages_without(["share-inpainted"])).rays
         self.fork = self.window(0.38, 0.60, 0.58, 0.78)
 
     def window(self, top: float, bottom: float, left: float, right: float) -> Window:

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from benchmarks.scenes import Scene
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.warp import SAME_SURFACE, SAMPLES, fill_holes
-from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.light_field import ViewMaker
 from iibr_core.runtime.kernels import kernel
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.types import FloatImage, InputError, ViewOffset
 
-ViewMaker = Callable[[ViewOffset], FloatImage]
-Way = Callable[[Scene], ViewMaker]
+MakeView = Callable[[ViewOffset], FloatImage]
+Way = Callable[[Scene], MakeView]
 PLANES = 32
 BEHIND_PX = 24
 """Distance over which planes continue behind nearer ones."""
@@ -31,21 +31,21 @@ SHARPNESS = 20.0
 """Factor of the softmax's exponent, per pixel of parallax."""
 
 
-def iibr(scene: Scene, stages: Stages = ALL_STAGES, refines: bool = True) -> ViewMaker:
+def iibr(scene: Scene, stages: Stages = ALL_STAGES, refines: bool = True) -> MakeView:
     """Return our views, with all stages or some. refines: the map's edges are drawn to the photo's."""
     disparity = scene.disparity
     if refines:
         disparity = refine(scene.photo, disparity, stages=stages, is_enlarged=scene.is_enlarged)
-    views = PhotoViews(scene.photo, disparity, scene.field, stages)
+    views = ViewMaker(scene.photo, disparity, scene.field, stages=stages)
     return lambda at: views.view(at).colors
 
 
-def unchanged(scene: Scene) -> ViewMaker:
+def unchanged(scene: Scene) -> MakeView:
     """Return the photo for every view."""
     return lambda at: scene.photo
 
 
-def warp(scene: Scene) -> ViewMaker:
+def warp(scene: Scene) -> MakeView:
     """Return forward-warped views: the nearest surface that lands, OpenCV's bicubic colours, holes from behind."""
 
     def view(at: ViewOffset) -> FloatImage:
@@ -75,7 +75,7 @@ def _looked_up(photo: FloatImage, disparity: FloatImage, at: ViewOffset, interpo
     return np.asarray(cv2.remap(photo, from_x, from_y, interpolation, borderMode=cv2.BORDER_REPLICATE))
 
 
-def ray_march(scene: Scene) -> ViewMaker:
+def ray_march(scene: Scene) -> MakeView:
     """Return views of a parallax shader, as of DepthFlow (Tremeschin): rays step through the map as through a relief.
 
     They march from the nearest plane backwards, first in coarse steps, then in fine ones; the relief has walls, so
@@ -91,7 +91,7 @@ def ray_march(scene: Scene) -> ViewMaker:
     return view
 
 
-def splatting(scene: Scene, dilated_px: int = 0) -> ViewMaker:
+def splatting(scene: Scene, dilated_px: int = 0) -> MakeView:
     """Return views by softmax splatting (Niklaus and Liu, CVPR 2020): pixels weighed by the exponential of nearness.
 
     dilated_px: growth of the foreground, as stereo converters (iw3, "forward fill") have it.
@@ -107,7 +107,7 @@ def splatting(scene: Scene, dilated_px: int = 0) -> ViewMaker:
     return view
 
 
-def planes(scene: Scene) -> ViewMaker:
+def planes(scene: Scene) -> MakeView:
     """Return views of 32 planes with soft alpha (multiplane images; Tucker and Snavely, CVPR 2020), made of the map.
 
     Each pixel is shared by the two planes next to its disparity. Planes continue behind nearer ones with colours of

@@ -18,7 +18,7 @@ from iibr_core.beyond.optics import ApertureShape
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.warp import reference_warp
-from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.light_field import ViewMaker
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.display.offscreen import OffscreenScene
@@ -91,7 +91,7 @@ def edges() -> FloatImage:
     given, refined = open_with_depth(DEMO, DepthChoice(refine=False)), open_with_depth(DEMO)
     photo, maps = given.photo.pixels, (given.disparity.values, refined.disparity.values)
     views = [np.asarray(reference_warp(photo, maps[0], outermost).colors)]
-    views += [PhotoViews(photo, disparity, steps).view(outermost).colors for disparity in maps]
+    views += [ViewMaker(photo, disparity, steps).view(outermost).colors for disparity in maps]
     rows = [np.concatenate([view[FORK], view[HANDLEBAR]], axis=1) for view in views]
     return np.concatenate(rows).repeat(2, axis=0).repeat(2, axis=1)
 

@@ -36,7 +36,7 @@ from iibr_core.evaluation.scenes import (
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.inpainting.background import fill_background
-from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.light_field import ViewMaker
 from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import part_of_job, report_progress
 from iibr_core.stages import ALL_STAGES, Stages
@@ -196,7 +196,7 @@ def _own_views(trial: Trial, photo: FloatImage, disparity: Disparity, options: O
         values = refine(photo, values, disparity.unknown, stages, disparity.is_enlarged)
     if not trial.is_free:
         offsets = [trial.offset(index) for index in trial.judged]
-        make = PhotoViews(photo, values, offsets, stages).view
+        make = ViewMaker(photo, values, offsets, stages=stages).view
         return lambda index: make(trial.offset(index)).colors, consistency(make, offsets)
     given, *others = (trial.camera(index, image_size(photo)) for index in (trial.given, *trial.judged))
     inverse_depth = (in_front(given, values) / np.float32(given.focal_px[0])).astype(np.float32)

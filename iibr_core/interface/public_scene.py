@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache
 from itertools import count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypedDict, Unpack, get_args
@@ -22,8 +21,6 @@ from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read
 from iibr_core.formats.maps.disparity_file import map_at_size
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.interface.fields import LightField, MakeView, View, gather
-from iibr_core.method.farthest_views import outer_views_of_grid
-from iibr_core.method.photo_views import PhotoViews
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.work import (
     ReportProgress,
@@ -35,7 +32,7 @@ from iibr_core.runtime.work import (
     watched,
 )
 from iibr_core.scenes.light_fields import READING, open_settled, read_dense
-from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, views_of_photo
+from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, view_maker_of
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Source
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
@@ -167,9 +164,9 @@ class PhotoScene(Scene):
         inpaint: str = DEFAULT_INPAINTER,
     ) -> _Making:
         source, plan = self._planned(grid, parallax, depth_strength, inpaint)
-        values = plan.field_disparity(self._loaded.disparity).values
-        rays = cache(lambda: PhotoViews(self.photo, values, outer_views_of_grid(plan.grid)))
-        return _Making(plan.grid, views_of_photo(source, self._loaded, plan), lambda offset: rays().view(offset).colors)
+        maker = view_maker_of(source, self._loaded, plan)
+        views = maker.generate(plan.grid, self._loaded.photo.is_hdr)
+        return _Making(plan.grid, views, lambda offset: maker.view(offset).colors)
 
 
 class FieldScene(Scene):

@@ -1,26 +1,30 @@
 """Photo + disparity -> the views of a light field, one after the other: sections 3.3 and 3.4 of the paper.
 
-The farthest views come first and complete the ray set; the others may come in any order. Every view is made once.
+The farthest views come first and complete the ray set; the others may come in any order, and between those of a grid.
+Every view is made once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from contextlib import suppress
-from functools import partial
+from functools import cached_property, partial
+from threading import Lock
 
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, EstimateDepth, Inpainter, load_inpainter, require_inpainter
-from iibr_core.method.farthest_views import farthest_views, outer_views_of_grid, outpainting_margins
+from iibr_core.method.farthest_views import farthest_views, outer_views, outer_views_of_grid, outpainting_margins
 from iibr_core.method.plan import ScenePlan
 from iibr_core.method.ray_transformer import shipped_transformer
-from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.rays import NO_MARGINS, RaySet, rays_of_photo
 from iibr_core.method.update_loop import update
-from iibr_core.method.view import Renderer, View, finished_colors
-from iibr_core.runtime.tiling import in_bands, side_by_side
+from iibr_core.method.view import Renderer, View, finish, finished_colors
+from iibr_core.runtime.tiling import THREADS, in_bands, side_by_side
 from iibr_core.runtime.work import Cancelled
+from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (
     Disparity,
     FloatImage,
@@ -31,6 +35,120 @@ from iibr_core.types import (
     ViewUpdate,
     image_size,
 )
+
+
+class ViewMaker:
+    """Makes views of one photo with one disparity map, all from one ray set.
+
+    The ray set is made and completed when it is first needed. outer: viewpoints that complete it.
+    """
+
+    def __init__(
+        self,
+        photo: FloatImage,
+        disparity: FloatImage,
+        offsets: Iterable[ViewOffset],
+        load: Callable[[], Inpainter] | None = None,
+        stages: Stages = ALL_STAGES,
+        has_disocclusion: bool = True,
+    ) -> None:
+        """Keep what views are made of.
+
+        photo (H, W, 3): sRGB-encoded. disparity (H, W): in px per view step. offsets: all that will be asked for, or
+        the corners of their box. load: returns the inpainter when the first view is made, None for the background's.
+        stages: that are on. has_disocclusion: False if no view shows what the photo does not.
+        """
+        self._photo, self._disparity, self._stages = photo, disparity, stages
+        self._load = load or (lambda: partial(fill_background, stages=stages))
+        corners = outer_views(offsets)
+        self._farthest, self.outer = farthest_views(corners), corners if has_disocclusion else []
+        self._rays: RaySet | None = None
+        self._outer_views: dict[ViewOffset, View] = {}
+        self._lock = Lock()
+
+    @property
+    def rays(self) -> RaySet:
+        """The complete ray set. Raises InputError if the transformer's weights or the inpainter cannot be read."""
+        with self._lock:
+            if self._rays is None:
+                self._outer_views = {offset: view for _, offset, view in self._complete()}
+            assert self._rays is not None
+            return self._rays
+
+    def view(self, offset: ViewOffset, threads: int = THREADS) -> View:
+        """Return the view at an offset. threads: number of row bands side by side."""
+        rays = self.rays
+        view = self._outer_views.get(offset) or self._renderer.render(rays, offset, threads)
+        return finish(rays, offset, view, threads)
+
+    def views(self, offsets: Iterable[ViewOffset]) -> Iterator[View]:
+        """Return an iterator over the views at these offsets, in their order, several made at a time."""
+        return side_by_side(lambda offset: self.view(offset, 1), offsets)
+
+    def generate(
+        self,
+        grid: GridShape,
+        is_hdr: bool = False,
+        nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+        wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
+    ) -> Generator[ViewUpdate]:
+        """Yield every view of a grid as it is stored, as the function `generate` does."""
+        with suppress(Cancelled):
+            nothing = np.zeros(image_size(self._photo), np.bool_)
+            yield ViewUpdate(*grid.centre, encode_for_storage(self._photo, is_hdr), self._disparity, nothing)
+            chosen = wanted()
+            views = [grid.offset(v, u) for v, u in np.ndindex(*grid) if (v, u) != grid.centre]
+            views = [at for at in views if chosen is None or at in chosen]
+            if not views:
+                return
+
+            def stored(rays: RaySet, offset: ViewOffset, view: View) -> ViewUpdate:
+                colors = finished_colors(rays, offset, view, encode_for_storage(view.colors, is_hdr, 1))
+                (v, u), (t, s) = grid.centre, offset
+                return ViewUpdate(v + round(t), u + round(s), colors, view.disparity, view.inpainted)
+
+            for rays, offset, view in self._complete():
+                if offset in views:
+                    views.remove(offset)
+                    yield stored(rays, offset, view)
+            rays = self.rays
+            yield from side_by_side(
+                lambda offset: stored(rays, offset, self._renderer.render(rays, offset)),
+                nearest_first(views, nearest_to),
+            )
+
+    @cached_property
+    def _renderer(self) -> Renderer:
+        return Renderer(shipped_transformer() if self._stages.ray_transformer else None, self._load())
+
+    def _complete(self) -> Iterator[tuple[RaySet, ViewOffset, View]]:
+        """Make the ray set and yield it with each outer view, not finished, whose inpainted pixels have joined it."""
+        stages, outer = self._stages, self.outer
+        margins = outpainting_margins(self._disparity, outer) if stages.outpainting else NO_MARGINS
+        rays = rays_of_photo(self._photo, self._disparity, self._farthest, len(outer), margins, stages)
+        for offset, view in update(rays, outer if stages.share_inpainted else (), self._renderer):
+            yield rays, offset, view
+        self._rays = rays
+
+
+def view_maker(
+    photo: Photo,
+    disparity: Disparity,
+    plan: ScenePlan,
+    inpaint: str = DEFAULT_INPAINTER,
+    estimate_depth: EstimateDepth | None = None,
+    stages: Stages = ALL_STAGES,
+) -> ViewMaker:
+    """Return the maker of the views of `plan.grid` and between them.
+
+    disparity: the field's (`plan.field_disparity(given)`). inpaint, estimate_depth: see `load_inpainter`. Raises
+    InputError if there is no such way of inpainting.
+    """
+    require_inpainter(inpaint)
+    # A model is not loaded for nothing.
+    load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, estimate_depth)
+    outer = outer_views_of_grid(plan.grid)
+    return ViewMaker(photo.pixels, disparity.values, outer, load, stages, plan.has_disocclusion)
 
 
 def generate(
@@ -44,70 +162,12 @@ def generate(
 ) -> Generator[ViewUpdate]:
     """Yield every view of `plan.grid` once: the photo's, then the farthest ones, then those nearest to `nearest_to()`.
 
-    disparity: the field's (`plan.field_disparity(given)`). inpaint, estimate_depth: see `load_inpainter`.
-    wanted: called once, after the photo's view was taken; returns the offsets of the views to make, None for all.
-    Pixels do not depend on the order of the views. The generator ends once the job is stopped. Raises InputError if the
-    transformer's weights cannot be read or there is no such way of inpainting.
+    Arguments of `view_maker`. wanted: called once, after the photo's view was taken; returns the offsets of the views
+    to make, None for all. Pixels do not depend on the order of the views. The generator ends once the job is stopped.
+    Raises InputError if the transformer's weights cannot be read or there is no such way of inpainting.
     """
-    with suppress(Cancelled):
-        require_inpainter(inpaint)
-        nothing = np.zeros(photo.size, np.bool_)
-        colors = encode_for_storage(photo.pixels, photo.is_hdr)
-        yield ViewUpdate(*plan.grid.centre, colors, disparity.values, nothing)
-        chosen = wanted()
-        views = [plan.grid.offset(v, u) for v, u in np.ndindex(*plan.grid) if (v, u) != plan.grid.centre]
-        views = [at for at in views if chosen is None or at in chosen]
-        if not views:
-            return
-        # A model is not loaded for nothing.
-        inpainter = load_inpainter(inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, estimate_depth)
-        yield from _generate_views(photo, disparity, plan, nearest_to, inpainter, views)
-
-
-def _generate_views(
-    photo: Photo,
-    disparity: Disparity,
-    plan: ScenePlan,
-    nearest_to: Callable[[], ViewOffset],
-    inpainter: Inpainter,
-    views: list[ViewOffset],
-) -> Iterator[ViewUpdate]:
-    """Yield the views that follow the photo's. views: all that are wanted; it is used up."""
-    renderer = Renderer(shipped_transformer(), inpainter)
-    rays, farthest = rays_of_grid(photo, disparity, plan)
-
-    def stored(offset: ViewOffset, view: View) -> ViewUpdate:
-        return _stored_view(rays, plan.grid, offset, view, photo.is_hdr)
-
-    for offset, view in update(rays, farthest, renderer):
-        if offset in views:
-            views.remove(offset)
-            yield stored(offset, view)
-    yield from side_by_side(
-        lambda offset: stored(offset, renderer.render(rays, offset)), nearest_first(views, nearest_to)
-    )
-
-
-def rays_of_grid(photo: Photo, disparity: Disparity, plan: ScenePlan) -> tuple[RaySet, Sequence[ViewOffset]]:
-    """Return the rays of the photo for `plan.grid`, and the farthest views, which `update` completes the rays by."""
-    every = outer_views_of_grid(plan.grid)
-    outer = every if plan.has_disocclusion else []
-    margins = outpainting_margins(disparity.values, outer)
-    return rays_of_photo(photo.pixels, disparity.values, farthest_views(every), len(outer), margins), outer
-
-
-def complete_rays(photo: Photo, disparity: Disparity, plan: ScenePlan, renderer: Renderer) -> RaySet:
-    """Return the rays that every view of `plan.grid` is made of."""
-    rays, farthest = rays_of_grid(photo, disparity, plan)
-    for _ in update(rays, farthest, renderer):
-        pass
-    return rays
-
-
-def stored_colors(rays: RaySet, offset: ViewOffset, view: View, is_hdr: bool) -> StoredColors:
-    """Return the colours (H, W, 3) of a view as a light field stores them."""
-    stored = encode_for_storage(view.colors, is_hdr, 1)
-    return finished_colors(rays, offset, view, stored)
+    maker = view_maker(photo, disparity, plan, inpaint, estimate_depth)
+    return maker.generate(plan.grid, photo.is_hdr, nearest_to, wanted)
 
 
 def encode_for_storage(encoded: FloatImage, is_hdr: bool, threads: int | None = None) -> StoredColors:
@@ -131,9 +191,3 @@ def nearest_first(remaining: list[ViewOffset], nearest_to: Callable[[], ViewOffs
 
 def _square_distance(one: ViewOffset, other: ViewOffset) -> float:
     return (other.t - one.t) ** 2 + (other.s - one.s) ** 2
-
-
-def _stored_view(rays: RaySet, grid: GridShape, offset: ViewOffset, view: View, is_hdr: bool) -> ViewUpdate:
-    (v, u), (t, s) = grid.centre, offset
-    colors = stored_colors(rays, offset, view, is_hdr)
-    return ViewUpdate(v + round(t), u + round(s), colors, view.disparity, view.inpainted)

@@ -15,14 +15,13 @@ from iibr_core.depth.search import find_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.reader import read_map_size
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.method.light_field import complete_rays
+from iibr_core.method.light_field import view_maker
 from iibr_core.method.plan import ScenePlan
 from iibr_core.method.rays import RaySet
-from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.photo import stamp_of
 from iibr_core.scenes.scene import LoadedPhoto, Source
+from iibr_core.stages import CLOSED_FORM
 from iibr_core.types import Disparity, FloatImage, InputError, Photo
 
 
@@ -55,8 +54,8 @@ def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RayS
     """Return the complete ray set of the light field, None if nothing is disoccluded."""
     if not plan.has_disocclusion:
         return None
-    renderer = Renderer(inpaint=load_inpainter(source.inpaint))
-    return complete_rays(loaded.photo, plan.field_disparity(loaded.disparity), plan, renderer)
+    disparity = plan.field_disparity(loaded.disparity)
+    return view_maker(loaded.photo, disparity, plan, source.inpaint, stages=CLOSED_FORM).rays
 
 
 def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:

@@ -23,7 +23,7 @@ from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.light_fields.light_field_formats import is_view_file
 from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.method.disparity_range import measure_disparity_range
-from iibr_core.method.light_field import generate
+from iibr_core.method.light_field import ViewMaker, view_maker
 from iibr_core.method.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
@@ -155,11 +155,15 @@ def views_of_photo(
     wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[ViewUpdate]:
     """Yield the views as `generate` does, in sRGB or in the photo's colour space."""
-    photo, disparity = loaded.photo, plan.field_disparity(loaded.disparity)
-    estimate_depth = depth_estimator(source, loaded)
-    return generate(
-        photo_in_srgb(photo) if in_srgb else photo, disparity, plan, nearest_to, source.inpaint, estimate_depth, wanted
-    )
+    maker = view_maker_of(source, loaded, plan, in_srgb)
+    return maker.generate(plan.grid, loaded.photo.is_hdr, nearest_to, wanted)
+
+
+def view_maker_of(source: Source, loaded: LoadedPhoto, plan: ScenePlan, in_srgb: bool = True) -> ViewMaker:
+    """Return the maker of the photo's views, in sRGB or in the photo's colour space."""
+    photo = photo_in_srgb(loaded.photo) if in_srgb else loaded.photo
+    disparity, estimate_depth = plan.field_disparity(loaded.disparity), depth_estimator(source, loaded)
+    return view_maker(photo, disparity, plan, source.inpaint, estimate_depth)
 
 
 def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:

@@ -7,7 +7,7 @@ import pytest
 
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.evaluate import Options
-from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.light_field import ViewMaker
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene
@@ -50,7 +50,7 @@ def views(case: str, stages: Stages) -> FloatImage:
     judged = [ViewOffset(2, 2), ViewOffset(-2, 1), ViewOffset(1, -1)]
     field = [ViewOffset(t, s) for t in (-2, 2) for s in (-2, 2)]
     disparity = refine(photo, values, stages=stages, is_enlarged=case == "enlarged")
-    made = PhotoViews(photo, disparity, field, stages)
+    made = ViewMaker(photo, disparity, field, stages=stages)
     return np.stack([made.view(at).colors for at in judged])
 
 

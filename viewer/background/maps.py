@@ -14,6 +14,7 @@ from iibr_core.gloss.settings import Gloss
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
+from iibr_core.stages import CLOSED_FORM
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import messages
 from viewer.model.action import Action, do
@@ -53,18 +54,15 @@ class EntropyWork:
 
     def __call__(self, request: EntropyRequest, post: Post[Entropy]) -> None:
         """Post the entropy of the view."""
-        from iibr_core.inpainting.registry import load_inpainter
-        from iibr_core.method.light_field import complete_rays
+        from iibr_core.method.light_field import view_maker
         from iibr_core.method.occlusion import view_entropy
-        from iibr_core.method.ray_transformer import shipped_transformer
-        from iibr_core.method.view import Renderer
 
         loaded, plan = request.loaded, request.plan
         values = np.zeros(loaded.photo.size, np.float32)  # the rays of the middle view are the photo's
         if request.view != plan.grid.centre:
             if self._generation != request.generation:
-                renderer = Renderer(shipped_transformer(), load_inpainter(request.inpaint))
-                self._rays = complete_rays(loaded.photo, plan.field_disparity(loaded.disparity), plan, renderer)
+                disparity = plan.field_disparity(loaded.disparity)
+                self._rays = view_maker(loaded.photo, disparity, plan, request.inpaint, stages=CLOSED_FORM).rays
                 self._generation = request.generation
             values = view_entropy(self._rays, plan.grid.offset(*request.view))
         post(Entropy(request.generation, request.view, np.rint(values * 255).astype(np.uint8)))

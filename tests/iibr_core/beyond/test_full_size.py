@@ -4,10 +4,10 @@ from scipy import ndimage
 
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.beyond.resized_light import mean_of_areas
-from iibr_core.method.light_field import rays_of_grid
+from iibr_core.method.light_field import view_maker
 from iibr_core.method.rays import rays_of_photo
-from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer, finish
+from iibr_core.stages import CLOSED_FORM
 from iibr_core.types import ImageSize, Photo, ViewOffset
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
@@ -46,15 +46,14 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     photo, disparity = square_before_wall(48, 60, foreground=1.5)
     red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
     plan = literal_plan(photo, disparity, 3)
-    rays, outer = rays_of_grid(photo, disparity, plan)
-    renderer = Renderer()
-    views = dict(update(rays, outer, renderer))
+    maker = view_maker(photo, disparity, plan, stages=CLOSED_FORM)
+    rays, renderer = maker.rays, Renderer()
     # Every inpainted ray is made red: so the larger photo's holes are.
     rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
     large_photo = LargePhoto(*(np.repeat(np.repeat(a, 2, 0), 2, 1) for a in (photo.pixels, 2 * disparity.values)), rays)
     offset = ViewOffset(-1.0, -1.0)
     (view,) = views_of_tile(large_photo, whole(large_photo.size), [offset], renderer)
-    hole = views[offset].occluded
+    hole = maker.view(offset).occluded
     assert hole.sum() > 20
     shown = view.colors[::2, ::2][hole]
     assert (np.abs(shown - red.pixels[0, 0]).max(axis=1) < 0.05).mean() > 0.8

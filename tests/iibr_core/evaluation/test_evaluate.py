@@ -18,8 +18,7 @@ from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.method.light_field import generate
-from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.light_field import ViewMaker, generate
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
 from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of
@@ -50,7 +49,7 @@ def test_views_are_those_that_generate_makes() -> None:
     grid = GridShape(5, 5)
     made = by_index(list(generate(photo, disparity, literal_plan(photo, disparity, 5))))
     offsets = {(v, u): grid.offset(v, u) for v, u in made if (v, u) != grid.centre}
-    views = PhotoViews(photo.pixels, disparity.values, offsets.values())
+    views = ViewMaker(photo.pixels, disparity.values, offsets.values())
     for index, offset in offsets.items():
         shown = np.rint(255 * quantise_as_stored(views.view(offset).colors)).astype(np.uint8)
         np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))

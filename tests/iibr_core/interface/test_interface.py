@@ -12,9 +12,11 @@ import iibr_core as iibr
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.method.light_field import generate
 from iibr_core.method.plan import plan_literal
 from iibr_core.types import Disparity, GridShape, InputError, Photo, ViewOffset
+from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import square_before_wall
 
 PAGE = Path(__file__).parents[3] / "docs" / "python.md"
@@ -83,6 +85,30 @@ def test_a_view_between_is_what_a_denser_field_has_there() -> None:
     sparse = scene.light_field(3, parallax="literal")
     dense = iibr.from_arrays(pixels, values / 2).light_field(5, parallax="literal")
     assert iibr.compare(sparse.view(0.5, 0), dense.view(1, 0)).psnr_db > 40
+
+
+def test_views_between_and_refocusing_inpaint_as_the_stored_views_do(monkeypatch) -> None:
+    """The rays are completed once: a view between asks the inpainter for itself alone."""
+    offsets: list[tuple[float, float]] = []
+
+    def paint_red(*args) -> None:
+        offsets.append(args[4])
+        red_inpainter.paint_red(*args)
+
+    monkeypatch.setattr(red_inpainter, "counting", paint_red, raising=False)
+    monkeypatch.setitem(INPAINTERS, "red", f"{red_inpainter.__name__}:counting")
+    field = iibr.from_arrays(*square_scene()).light_field(5, inpaint="red", parallax="literal")
+
+    def red_pixels(view: np.ndarray) -> int:
+        return int(np.all(np.abs(view - [1, 0, 0]) < 0.01, axis=-1).sum())
+
+    stored = red_pixels(field.view(2, 0))
+    asked = len(offsets)
+    assert stored > 20
+    assert red_pixels(field.view(1.999, 0)) == pytest.approx(stored, abs=3)
+    reddish = field.refocus(0.0, 4.0)
+    assert (reddish[..., 0] - reddish[..., 1:].max(axis=-1)).max() > 0.4
+    assert all(max(map(abs, offset)) < 2 for offset in offsets[asked:]), "no corner view is made again"
 
 
 def test_refocusing_is_the_mean_of_the_views_inside_the_aperture() -> None:

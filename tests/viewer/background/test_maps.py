@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.method.light_field import complete_rays
+from iibr_core.method.light_field import view_maker
 from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.plan import plan_for_viewing
-from iibr_core.method.ray_transformer import shipped_transformer
-from iibr_core.method.view import Renderer
 from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from tests.viewer.conftest import write_scene
@@ -25,7 +23,7 @@ def test_the_map_is_the_entropy_of_the_weights_of_its_view(tmp_path: Path) -> No
     work = EntropyWork()
     for view in ((0, 0), plan.grid.centre, (0, 1)):
         work(EntropyRequest(1, view, loaded, plan, DEFAULT_INPAINTER), found.append)
-    rays = complete_rays(loaded.photo, plan.field_disparity(loaded.disparity), plan, Renderer(shipped_transformer()))
+    rays = view_maker(loaded.photo, plan.field_disparity(loaded.disparity), plan).rays
     corner, middle, above = (entropy.values for entropy in found)
     expected = view_entropy(rays, plan.grid.offset(0, 0))
     assert 0 <= expected.min() < expected.max() <= 1
