@@ -18,7 +18,7 @@ from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, SlowSource, estimator_of, find_depth, open_with_depth
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.metadata import settings_text_in
-from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_thumbnail
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_thumbnail, size_within
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.light_fields.light_field_formats import is_view_file
 from iibr_core.inpainting.registry import EstimateDepth
@@ -33,6 +33,8 @@ SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
 SKETCH_WORTH_PIXELS = 1_500_000
 """Number of pixels from which on a photo gets a sketch: smaller ones are read quickly."""
+MAX_SIDE_PX = 16_384
+"""Longest side of a photo as it is opened: the limit of most graphics drivers."""
 
 
 def stamp_of(path: Path) -> tuple[int, ...]:
@@ -177,7 +179,10 @@ def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
     path = Path(source.path)
     if is_view_file(path):
         raise InputError(f"{path}: holds the views of a light field, not a photo; open it as a light field")
-    return source.max_pixels or DEFAULT_MAX_PIXELS, photo_size(path)
+    size, pixels = photo_size(path), source.max_pixels or DEFAULT_MAX_PIXELS
+    if max(size_within(size, pixels)) > MAX_SIDE_PX:
+        pixels = max(math.floor(math.prod(size) * (MAX_SIDE_PX / max(size)) ** 2), 1)
+    return pixels, size
 
 
 def _loaded(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.exports.full_picture import require_full
+from iibr_core.exports.full_picture import MAX_PIXELS, require_full
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.formats.lenticular import Calibration, read_calibration
 from iibr_core.scenes.lens_limits import LensChoice
@@ -170,5 +171,11 @@ def _size_of(viewer: OffscreenScene, size: ScreenSize | None, is_full: bool) -> 
         return size
     if viewer.state.optics.gloss is not None:
         raise InputError("--full: gloss is drawn from the views, which may be smaller; leave out one of both")
+    own_size = viewer.scene.own_size or viewer.scene.size
+    if math.prod(own_size) > MAX_PIXELS:
+        from iibr_core.formats.images.photo import size_within
+
+        largest = size_within(ImageSize(own_size.height, own_size.width), MAX_PIXELS)
+        raise InputError(f"--full: the photo has more than {MAX_PIXELS // 10**6} million pixels; give --size {largest}")
     require_full(viewer.scene)
-    return viewer.scene.own_size or viewer.scene.size
+    return own_size

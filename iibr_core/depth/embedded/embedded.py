@@ -19,6 +19,7 @@ from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_depth_file, is_avif
 from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, is_heic, read_heic_depth
+from iibr_core.formats.images.jpeg_xl import has_depth_channel
 from iibr_core.formats.images.lfp import is_lfp, read_lfp_depth
 from iibr_core.formats.images.metadata import read_metadata
 from iibr_core.formats.images.photo import read_photo
@@ -177,6 +178,8 @@ def unread_parts(path: Path) -> tuple[str, ...]:
     """
     in_heic = " ".join(heic_auxiliaries(path)).encode() if is_heic(path) else b""
     parts = _mattes(in_heic) + _unread_in_jpeg(_jpeg_bytes(path))
+    if has_depth_channel(path):
+        parts.append(f"a depth channel (save it, for example with djxl, as {path.stem}_depth.png)")
     return tuple(f"{path.name} holds {part}; this is not read." for part in parts)
 
 

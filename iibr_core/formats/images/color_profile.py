@@ -48,6 +48,8 @@ KNOTS = 65536
 SAME_CURVE = 1 / 255
 """Largest difference of encoded values within one curve: a step of 8 bits, as small profiles of sRGB are off."""
 UNNAMED_PROFILE = "without a name"
+MAX_EXPONENT, MAX_FLOAT = 3.0, 1e6
+"""Limits of the power law beyond white, and of the encoded values it is applied to."""
 PARAMETRIC = (1, 3, 4, 5, 7)
 """Number of parameters of each kind of formula (ICC.1:2022, table 68)."""
 MAX_PROFILE_BYTES = 4 * 2**20
@@ -83,8 +85,8 @@ class ColorProfile:
     hdr: Hdr = ""
 
     def linear(self, pixels: NDArray[Any]) -> FloatImage:
-        """Return linear light of `color_space`, float32, of pixels (H, W, 3), uint8 or uint16."""
-        light = _look_up(self.curves, pixels)
+        """Return linear light of `color_space`, float32, of pixels (H, W, 3), uint8, uint16 or float32."""
+        light = _light_of_floats(self.curves, pixels) if pixels.dtype.kind == "f" else _look_up(self.curves, pixels)
         return hlg_display_light(light) if self.hdr == "HLG" else light
 
     def encoded(self, pixels: NDArray[Any]) -> FloatImage:
@@ -98,6 +100,17 @@ def icc_profile(space: ColorSpace) -> bytes:
     return (resource_folder("assets") / "profiles" / PROFILE_FILES[space.name]).read_bytes()
 
 
+def _light_of_floats(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
+    """Return linear light of pixels (H, W, 3); beyond white, curves (3, KNOTS) go on as the power law they end with."""
+    result, at = np.empty(pixels.shape, np.float32), np.linspace(0, 1, KNOTS, dtype=np.float32)
+    for channel, curve in enumerate(curves):
+        values, white = pixels[..., channel], float(curve[-1])
+        exponent = min((1 - float(curve[-2]) / white) * (KNOTS - 1), MAX_EXPONENT) if white > 0 else 1.0
+        beyond = white * np.clip(values, 1, MAX_FLOAT).astype(np.float64) ** exponent
+        result[..., channel] = np.where(values > 1, beyond, np.interp(values, at, curve))
+    return result
+
+
 def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
     """Return the values of curves (3, KNOTS) at pixels (H, W, 3)."""
     steps = (KNOTS - 1) // np.iinfo(pixels.dtype).max  # 257 or 1
@@ -109,28 +122,30 @@ def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
 
 def color_space_of(picture: Picture) -> ColorSpace:
     """Return the colour space of a picture: by its profile, or OpenEXR's chromaticities; sRGB where it states none."""
-    if picture.is_float:
+    if picture.is_float and not picture.icc:
         return space_of_chromaticities(picture.chromaticities)
     profile = color_profile_of(picture)[0]
     return SRGB if profile is None else profile.color_space
 
 
 def color_profile_of(picture: Picture) -> tuple[ColorProfile | None, str]:
-    """Return the profile of a picture of whole numbers, and a note about it; None, "" for sRGB.
+    """Return the profile of a picture, and a note about it; None, "" for sRGB, and for floats that are linear light.
 
     Numbers count more than a profile beside them (PNG, third edition, 11.3.2.6). A profile that cannot be used gives
     None and a note: the picture counts as sRGB. Grey has no primaries, so only its HDR curve matters.
     """
-    if picture.is_float:
+    if picture.is_float and not picture.icc:
         return None, ""
     name, complaint = _name_in(picture.icc), ""
     profile = profile_of_codes(picture.codes[:2] or codes_named(name))
     if profile is not None:
         name = profile.color_space.name
     elif picture.icc:
-        profile, complaint = read_profile(picture.icc)
+        profile, complaint = read_profile(picture.icc, picture.pixels.shape[2] < 3)
     if profile is not None and profile.hdr:
         return profile, f"HDR photo ({profile.hdr}): its highlights are compressed to the range of ordinary photos."
+    if picture.is_float and profile is not None and (picture.pixels.shape[2] < 3 or _is_srgb(profile)):
+        return profile, ""
     if picture.pixels.shape[2] < 3 or (profile is not None and _is_srgb(profile)):
         return None, ""
     if profile is None:
@@ -166,14 +181,21 @@ def _is_srgb(profile: ColorProfile) -> bool:
 
 
 @lru_cache(maxsize=4)  # a photo is read in many parts
-def read_profile(data: bytes) -> tuple[ColorProfile | None, str]:
-    """Return the meaning of a profile; where it cannot be used, None and the reason."""
-    if data[16:24] != b"RGB XYZ ":
+def read_profile(data: bytes, is_grey: bool = False) -> tuple[ColorProfile | None, str]:
+    """Return the meaning of a profile; where it cannot be used, None and the reason.
+
+    is_grey: whether it belongs to a grey picture, whose profile may have one curve alone.
+    """
+    has_one_curve = is_grey and data[16:20] == b"GRAY"
+    if data[16:24] != b"RGB XYZ " and not has_one_curve:
         return None, "is not for red, green and blue"
     if len(data) > MAX_PROFILE_BYTES:
         return None, "is too large"
     try:
         tags = _tags(data)
+        if has_one_curve:
+            curves = np.tile(_curve(tags[b"kTRC"]), (3, 1))
+            return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), SRGB), ""
         if (coded := profile_of_codes(tuple(tags.get(b"cicp", b"")[8:10]))) is not None and coded.hdr:
             return coded, ""
         colors = [struct.unpack_from(">3i", tags[name], 8) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]

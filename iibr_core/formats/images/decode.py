@@ -1,5 +1,6 @@
 """Decodes picture files of every kind. Headers are checked before memory is spent; a file is read whole, or refused."""
 
+import itertools
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +28,14 @@ HARMLESS_MESSAGE = "extraneous bytes"
 NO_READER = "could not find a format reader"
 """Complaint of OpenImageIO about a file of unknown kind."""
 FLOATING_TYPES = ("half", "float", "double")
+WIDE_TYPES = {"int16": "int16", "int": "int32", "uint": "uint32"}
+"""NumPy's names of types whose integers are scaled by their own range, by the names that OpenImageIO gives to them."""
+IS_REDUCED = 1
+"""Bit of a TIFF page's NewSubfileType: a preview of another page."""
+MAX_PAGES = 16
+"""Largest number of pages among which the photo is looked for."""
+MIN_PREVIEW_RATIO, MAX_PREVIEW_STRETCH = 2.0, 0.03
+"""How much larger the page after a preview is along each side, and the largest difference of their aspect ratios."""
 LINEAR_TRANSFERS = (2, 8)
 """Transfer curves of ITU-T H.273 that leave light unchanged: "unspecified" and "linear"."""
 NOTES_OF_MODELS = {
@@ -72,7 +81,7 @@ def decode_bands(path: Path) -> Iterator[Picture]:
     if not (is_avif(path) or is_heic(path) or is_lfp(path)):
         source = _open(path)
         spec, stored = source.spec(), _stored(path, source.spec())
-        if stored.alpha_at < 0 and stored.dtype != "float32":
+        if stored.alpha_at < 0 and stored.dtype in ("uint8", "uint16"):
             facts = _facts(spec)
             yield from (Picture(rows, **facts) for rows in _read_rows(path, source, stored))
             return
@@ -112,7 +121,8 @@ def open_header(path: Path) -> Any | None:
     source = oiio.ImageInput.open(oiio_name(path))
     if source is None:
         complaint_of(oiio)
-    return source
+        return None
+    return _at_photo(source)
 
 
 def oiio_name(path: Path) -> str:
@@ -163,8 +173,38 @@ def _decode_with_oiio(path: Path) -> Picture:
     for rows in _read_rows(path, source, stored):  # all at once would take the memory twice
         values[first : first + len(rows)] = rows
         first += len(rows)
-    alpha = opaque_as_none(values[..., stored.alpha_at]) if stored.alpha_at >= 0 else None
-    return Picture(values[..., : stored.colors], alpha, **_facts(spec))
+    colors = values[..., : stored.colors]
+    wide = colors if stored.dtype in WIDE_TYPES.values() else None
+    alpha = opaque_as_none(_narrowed(values[..., stored.alpha_at])) if stored.alpha_at >= 0 else None
+    return Picture(_narrowed(colors), alpha, wide=wide, **_facts(spec))
+
+
+def _narrowed(values: NDArray[Any]) -> NDArray[Any]:
+    """Return wide integers as uint16, white being the power of two above the largest; all other numbers as they are."""
+    if values.dtype.name not in WIDE_TYPES.values():
+        return values
+    white = 2 ** max(int(values.max(initial=0)).bit_length(), 8) - 1
+    return np.asarray(np.rint(np.maximum(values, 0) * np.float32(65535 / white)), np.uint16)
+
+
+def _at_photo(source: Any) -> Any:
+    """Seek the first page of a TIFF that is no preview of a later one, and return the file."""
+    if source.format_name() != "tiff":
+        return source
+    first, was_reduced = source.spec(), _is_reduced(source.spec())
+    for _ in itertools.takewhile(lambda page: source.seek_subimage(page, 0), range(1, MAX_PAGES)):
+        spec = source.spec()
+        ratio = spec.height / first.height
+        is_alike = abs(spec.width / (first.width * ratio) - 1) <= MAX_PREVIEW_STRETCH
+        if not _is_reduced(spec) and ratio > 1 and (was_reduced or (is_alike and ratio >= MIN_PREVIEW_RATIO)):
+            return source
+    complaint_of(source)
+    source.seek_subimage(0, 0)
+    return source
+
+
+def _is_reduced(spec: Any) -> bool:
+    return bool(spec.get_int_attribute("tiff:subfiletype", 0) & IS_REDUCED)
 
 
 def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any]]:
@@ -216,7 +256,7 @@ def _open(path: Path) -> Any:
         if NO_READER in complaint:
             raise InputError(f"{path}: cannot be read as a picture (of no known kind); save it as JPEG, PNG or TIFF")
         raise InputError(f"{path}: {decoding_fault(_without_name(complaint, path), is_opened=False)}")
-    spec = source.spec()
+    spec = _at_photo(source).spec()
     if spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is not a flat picture")
     require_sound_size(path, spec.width, spec.height, spec.image_bytes())
@@ -236,6 +276,7 @@ def _stored(path: Path, spec: Any) -> _Stored:
     is_encoded = isinstance(codes, tuple) and codes[1] not in LINEAR_TRANSFERS  # in JPEG XL, floats may be no light
     if str(spec.format) in FLOATING_TYPES:
         dtype = "uint16" if is_encoded else "float32"
+    dtype = WIDE_TYPES.get(str(spec.format), dtype)
     return _Stored(colors, alpha_at, max(colors, alpha_at + 1), dtype)
 
 

@@ -28,9 +28,9 @@ class FileKind(NamedTuple):
 RAW = FileKind("a camera's RAW file", "develop it and save it as TIFF or JPEG")
 VIDEO = FileKind("a video", "save one of its frames as PNG or JPEG")
 ARCHIVE = FileKind("an archive", "unpack it and open the picture in it")
-DAMAGED_JPEG_XL = FileKind("JPEG XL, but damaged or of a newer kind", "save it as PNG or AVIF")
+OTHER_JPEG_XL = FileKind("JPEG XL that cannot be read here", "save it as PNG, for example with djxl, or get it again")
 KINDS: tuple[tuple[bytes, FileKind], ...] = (
-    (rb"\xff\x0a|\0\0\0\x0cJXL ", DAMAGED_JPEG_XL),
+    (rb"\xff\x0a|\0\0\0\x0cJXL ", OTHER_JPEG_XL),
     (rb"%PDF-", FileKind("a PDF document", "save the page or its picture as PNG")),
     (rb"%!PS|\xc5\xd0\xd3\xc6", FileKind("a PostScript drawing", "save it as PNG")),
     (rb"(?i)(<\?xml[^>]*>|<!--.*?-->|<!DOCTYPE svg[^>]*>|\s)*<svg\b", FileKind("a drawing (SVG)", "save it as PNG")),

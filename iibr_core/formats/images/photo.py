@@ -1,4 +1,4 @@
-"""Reads photos: linear light of floating-point files, colours of all others as their profiles state.
+"""Reads photos: colours as their profiles state; floating-point files without one hold linear light.
 
 The notes of a photo name all that reading changed: alpha, size, values that are not finite, colour profile, HDR.
 """

@@ -32,12 +32,14 @@ MIN_FOCAL_DIAGONALS, MAX_FOCAL_DIAGONALS = 0.05, 200.0
 class Picture:
     """A picture as its file stores it.
 
-    pixels: (H, W, C), C = 1 or 3; uint8 or uint16 as encoded, float32 linear light for every floating-point file.
+    pixels: (H, W, C), C = 1 or 3; uint8 or uint16 as encoded, float32 for every floating-point file: linear light, or
+    as its profile states.
     alpha: (H, W) of the same type, None where all is opaque. is_premultiplied: whether `pixels` are multiplied by it.
     orientation: Exif's, 1 to 8; other values count as 1. focal_px: focal length by Exif in stored pixels, 0 where it is
-    unknown. icc: colour profile, b"" without one. codes: colours in numbers (ITU-T H.273), primaries and transfer
-    curve first, () without them. chromaticities: x and y of red, green, blue and white as OpenEXR has them, () without
-    them. note: for people, on colours that the decoder converted from CMYK or Lab; "" for other pictures.
+    unknown. wide: (H, W, C) integers of more than 16 bits, or signed ones, as stored, which `pixels` holds scaled to 16
+    bits; None for other files. icc: colour profile, b"" without one. codes: colours in numbers (ITU-T H.273), primaries
+    and transfer curve first, () without them. chromaticities: x and y of red, green, blue and white as OpenEXR has
+    them, () without them. note: for people, on colours that the decoder converted from CMYK or Lab; "" without.
     """
 
     pixels: NDArray[Any]
@@ -45,6 +47,7 @@ class Picture:
     is_premultiplied: bool = False
     orientation: int = 1
     focal_px: float = 0.0
+    wide: NDArray[Any] | None = None
     icc: bytes = b""
     codes: tuple[int, ...] = ()
     chromaticities: tuple[float, ...] = ()
@@ -57,7 +60,7 @@ class Picture:
 
     @property
     def is_float(self) -> bool:
-        """True for linear light, which may exceed white."""
+        """True for floating-point numbers, which may exceed white."""
         return bool(self.pixels.dtype.kind == "f")
 
 

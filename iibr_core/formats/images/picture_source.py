@@ -79,7 +79,7 @@ def part_of(picture: Picture, source: PictureSource) -> Picture:
         return np.ascontiguousarray(values if source.shown_size is None else _stretch(values, source.shown_size))
 
     alpha = None if picture.alpha is None else cut(picture.alpha)
-    return replace(picture, pixels=cut(picture.pixels), alpha=alpha, orientation=1)
+    return replace(picture, pixels=cut(picture.pixels), alpha=alpha, wide=None, orientation=1)
 
 
 def cut_part(values: NDArray[Any], part: PicturePart) -> NDArray[Any]:

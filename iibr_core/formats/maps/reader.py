@@ -120,12 +120,12 @@ def read_depth_channel(path: Path) -> FloatImage | None:
 def _map_of_picture(path: Path, picture: Picture) -> MapFile:
     turns = picture.orientation
     notes = (f"{path.name} was turned upright, as its Exif says.",) if turns > 1 else ()
-    pixels = upright(picture.pixels, turns)
+    pixels = upright(picture.pixels if picture.wide is None else picture.wide, turns)
     grey = _grey(pixels)
     if grey is None:
         found = _map_of_colors(path, pixels)
-    elif pixels.dtype.kind == "u":
-        found = _map_of_integers(grey.astype(np.float32), grey, full_scale(pixels.dtype))
+    elif pixels.dtype.kind in "iu":
+        found = _map_of_integers(grey.astype(np.float32), grey, np.iinfo(pixels.dtype).max)
     else:
         found = MapFile(grey.astype(np.float32), "floats")
     if picture.alpha is not None:

@@ -5,8 +5,10 @@ from io import BytesIO
 import numpy as np
 import pillow_heif
 import pytest
+import tifffile
 from PIL import Image, ImageCms
 
+from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.color_profile import read_profile
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import DISPLAY_P3, SRGB
@@ -48,6 +50,11 @@ def profile_bytes(primaries=P3, curve=SRGB_CURVE, space=b"RGB ", name="made here
     return header + bytes(28) + fixed(0.9642, 1, 0.8249) + bytes(128 - len(header) - 40) + table + body
 
 
+def grey_profile(curve):
+    data = profile_bytes(curve=curve, space=b"GRAY", leave_out=(b"gTRC", b"bTRC"))
+    return data.replace(b"rTRC", b"kTRC")
+
+
 def converted(colors, data):
     """By Pillow (littleCMS), which has 8 bits."""
     source = ImageCms.ImageCmsProfile(BytesIO(data))
@@ -76,6 +83,23 @@ def test_photos_are_converted_as_littlecms_does(tmp_path, curve):
     assert photo.notes == ("Colours are those of the photo's profile, 'made here'.",)
     assert photo.color_space == SRGB
     assert not photo.is_hdr
+
+
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
+@pytest.mark.parametrize("is_grey", [False, True])
+def test_the_curve_of_a_profile_counts_for_floats_too(tmp_path, curve, is_grey):
+    stored = np.where(RNG.random(COLORS.shape) < 0.1, 1.5, COLORS / 255).astype(np.float32)
+    stored, data = (stored[..., :1], grey_profile(curve)) if is_grey else (stored, profile_bytes(ADOBE, curve))
+    kind = "minisblack" if is_grey else "rgb"
+    tifffile.imwrite(tmp_path / "a.tif", stored, photometric=kind, extratags=[(34675, 7, len(data), data, True)])
+    photo = read_photo(tmp_path / "a.tif", keeps_primaries=True)
+    read = linear_from_srgb(photo.pixels)
+    profile = read_profile(data, is_grey)[0]
+    channels = zip(np.moveaxis(np.broadcast_to(stored, COLORS.shape), 2, 0), profile.curves)
+    expected = np.stack([np.interp(values, np.linspace(0, 1, 65536), curve) for values, curve in channels], -1)
+    is_white = np.broadcast_to(stored > 1, expected.shape)
+    np.testing.assert_allclose(read[~is_white], expected[~is_white], atol=1e-3)
+    assert (read[is_white] > expected[is_white]).all()
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.webp", "a.heic"])

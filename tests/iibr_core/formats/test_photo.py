@@ -5,6 +5,7 @@ import os
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+import tifffile
 from PIL import Image
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
@@ -49,6 +50,33 @@ def area_average(linear, size):
 
     rows, columns = overlaps(linear.shape[0], size[0]), overlaps(linear.shape[1], size[1])
     return np.einsum("ij,jkc,lk->ilc", rows, linear.astype(np.float64), columns, optimize=True)
+
+
+@pytest.mark.parametrize("largest", [255, 4095, 10**6])
+@pytest.mark.parametrize("dtype", ["int32", "uint32", "int16"])
+def test_wide_integers_are_scaled_by_their_own_range(tmp_path, dtype, largest):
+    if largest > np.iinfo(dtype).max:
+        return
+    stored = RNG.integers(0, largest, (9, 8, 3), endpoint=True).astype(dtype)
+    stored[0, 0] = largest
+    white = 2 ** largest.bit_length() - 1
+    tifffile.imwrite(tmp_path / "a.tif", stored, photometric="rgb")
+    np.testing.assert_allclose(read_photo(tmp_path / "a.tif").pixels, stored / white, atol=1e-4)
+    assert read_photo(tmp_path / "a.tif", 20).size == (4, 4)
+
+
+@pytest.mark.parametrize("is_marked", [True, False])
+def test_the_photo_of_a_tiff_follows_its_preview(tmp_path, is_marked):
+    photo, preview = np.repeat(np.repeat(RGB, 4, 0), 4, 1), RGB
+    with tifffile.TiffWriter(tmp_path / "a.tif") as file:
+        file.write(preview, photometric="rgb", subfiletype=int(is_marked), metadata=None)
+        file.write(photo, photometric="rgb", metadata=None, extratags=[(ORIENTATION, 3, 1, 6, False)])
+    assert np.array_equal(np.rint(255 * read_photo(tmp_path / "a.tif").pixels), np.rot90(photo, -1))
+    assert read_photo(tmp_path / "a.tif", 2000).size == (51, 39)
+    with tifffile.TiffWriter(tmp_path / "pages.tif") as file:
+        for page in (preview, photo[:, :40], preview[:5]):
+            file.write(page, photometric="rgb", metadata=None)
+    assert read_photo(tmp_path / "pages.tif").size == preview.shape[:2]
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.tif", "a.webp"])

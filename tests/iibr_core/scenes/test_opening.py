@@ -33,6 +33,13 @@ def opened(source: Source, **changes: object) -> SceneReady:
     return ready
 
 
+def test_a_strip_is_opened_within_the_limit_of_graphics_drivers(tmp_path) -> None:
+    write_image(tmp_path / "strip.png", np.zeros((8, 40_000, 3), np.uint8))
+    loaded = load_photo(Source(str(tmp_path / "strip.png"), DepthChoice("flat")))
+    assert 16_000 < loaded.photo.size.width <= 16_384
+    assert loaded.own_size == (8, 40_000)
+
+
 def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") -> Path:
     rows, columns = np.mgrid[:1200, :1600]
     pixels = np.stack([rows % 256, columns % 256, (rows // 100 + columns // 100) % 2 * 200], axis=2)

@@ -180,6 +180,8 @@ def test_full_sets_the_size_and_needs_memory(
     write_image(large, np.zeros((2000, 3000, 3), np.uint8))
     monkeypatch.setattr("iibr_core.exports.full_picture.OWN_SIZE_BYTES", 10**9)
     assert "own size" in refusal_of(iibr("screenshot", large, "--depth", "flat", "--full", "-o", out))
+    monkeypatch.setattr("viewer.cli.screenshot.MAX_PIXELS", 10**6)
+    assert "--size 1224x816" in refusal_of(iibr("screenshot", large, "--depth", "flat", "--full", "-o", out))
     assert not out.exists()
 
 
