@@ -18,7 +18,7 @@ class DepthOrigin:
 
     words: name for people ("scene.pfm", "the photo itself (Google GDepth)"). failures: a sentence on each source that
     was tried in vain. file: path of the map, None for other sources. near: end of the values that counts as near, ""
-    if the source defines it.
+    if the source defines it. model: name or path of the model, "" for other sources.
     """
 
     kind: DepthKind
@@ -26,6 +26,7 @@ class DepthOrigin:
     failures: tuple[str, ...] = ()
     file: str | None = None
     near: str = ""
+    model: str = ""
 
     @property
     def is_poor(self) -> bool:
@@ -44,7 +45,7 @@ class DepthChoice:
 
     file: a map that must be used. file_scale: factor from its values to px per view step; None: not given. inverts:
     near and far change places. is_metric: the map or the model gives distances. stretches: a map of another shape
-    shows the whole photo. model: a folder or a name, None for the usual one if it is there. refine: whether
+    shows the whole photo. model: a folder or a name, None for one that is there. refine: whether
     disparity edges are drawn to the photo's.
     """
 

@@ -198,7 +198,8 @@ class _Search:
         if model is None:
             return None
         raise_if_stopped()
-        estimate, origin = model.estimate(self.photo), DepthOrigin("model", f"estimated by {model.title}")
+        words = f"estimated by {model.title}"
+        estimate, origin = model.estimate(self.photo), DepthOrigin("model", words, model=model.name)
         if estimate.meaning == "disparity" or model.is_meaning_known:
             return self.finish(origin, estimate)
         values = MapFile(estimate.values, "floats")

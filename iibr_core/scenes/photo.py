@@ -14,7 +14,6 @@ from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import DepthCanvas
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Levels, Stroke, extent_of, levels_of
-from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, SlowSource, estimator_of, find_depth, open_with_depth
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.metadata import settings_text_in
@@ -195,7 +194,7 @@ def _loaded(
         disparity,
         found.origin,
         settings,
-        (source.depth.model or USUAL_MODEL) if found.origin.kind == "model" else None,
+        found.origin.model or None,
         DepthSettings(refine=False),
         disparity,
         disparity,

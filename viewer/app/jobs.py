@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -135,9 +135,12 @@ class Jobs:
         loaded, plan = view.loaded, scene.plan
         if view.generation != job.generation or loaded is None or loaded.depth_settings != state.depth:
             loaded = plan = None  # another photo or other depth than asked for
+        source = scene.source
+        if scene.depth_model is not None:
+            source = replace(source, depth=replace(source.depth, model=scene.depth_model))
         job.request = SceneRequest(
             0,
-            scene.source,
+            source,
             state.depth_strength,
             loaded,
             state.depth,

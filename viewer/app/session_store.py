@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from iibr_core.formats.files import read_text
@@ -18,6 +19,7 @@ from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.model import messages, opening
 from viewer.model.action import Action, do
+from viewer.model.remedies import words_of
 from viewer.model.saving import settings_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -41,7 +43,7 @@ class SessionStore:
         self._wake = wake
         self._executor = ThreadPoolExecutor(1, "iibr-sessions")
         self._scene: Scene | None = None
-        self._search: Future[SavedSettings | None] | None = None
+        self._search: Future[tuple[SavedSettings, str] | None] | None = None
         self._writes: list[Future[None]] = []
         self._saved: SavedSettings | None = None
         self._latest: SavedSettings | None = None
@@ -55,26 +57,29 @@ class SessionStore:
         actions, scene = self._take_search(state) + self._report_failure(), state.scene
         if actions or scene is None or scene.is_sketch or scene.source is not state.source:
             return actions
+        if self._scene is not None and _has_other_model(self._scene.source, scene.source):
+            self._scene = scene
         if self._scene is None or self._scene.source is not scene.source:
             self._save()
             self._scene = scene
-            self._saved = self._latest = settings_of(state.at_rest, scene.size)
+            self._saved = self._latest = _settings_now(state, scene)
             self._search = self._executor.submit(_read, self._folder, scene.source)
             self._search.add_done_callback(lambda _: self._wake())
         elif self._search is None and state.stroke is None:
-            self._follow(settings_of(state.at_rest, scene.size))
+            self._follow(_settings_now(state, scene))
         return []
 
     def close(self, state: AppState) -> None:
         """Write the session of the open photo, and wait for it."""
         if self._search is None and self._scene is not None and state.source is self._scene.source:
-            self._latest = settings_of(state.at_rest, self._scene.size)
+            self._latest = _settings_now(state, self._scene)
         self._save()
         self._executor.shutdown()
 
     def _follow(self, settings: SavedSettings) -> None:
         saved = self._saved
-        if saved is None or (self._latest == saved and settings.has_model_depth != saved.has_model_depth):
+        is_estimated = saved is not None and settings.source == saved.source and _model(settings) != _model(saved)
+        if saved is None or (self._latest == saved and is_estimated):
             self._saved = self._latest = settings  # as it was opened: the user has changed nothing
         elif settings != self._latest:
             self._latest, self._changed_at = settings, time.monotonic()
@@ -92,13 +97,13 @@ class SessionStore:
             return []
         search, self._search = self._search, None
         try:
-            settings = search.result()
+            found = search.result()
         except InputError as error:
             return [do(messages.notify, Notice(str(error)))]
-        if settings is None or state.scene is None or state.scene.source is not self._scene.source:
+        if found is None or state.scene is None or state.scene.source is not self._scene.source:
             return []
         self._saved = self._latest = None  # what is restored counts as written, once it is shown
-        return [do(opening.restore_session, settings)]
+        return [do(opening.restore_session, *found)]
 
     def _report_failure(self) -> list[Action]:
         """Return a notice for the first session that cannot be written."""
@@ -122,11 +127,38 @@ def key_of(source: Source) -> str:
     return hashlib.blake2b(repr((str(path), stamp, reading)).encode(), digest_size=16).hexdigest()
 
 
-def _read(folder: Path, source: Source) -> SavedSettings | None:
+def _has_other_model(before: Source, now: Source) -> bool:
+    """Return whether a source is the same but for the depth model that was chosen for it."""
+    depth = before.depth
+    starts = (depth.start, "model")
+    is_same = replace(before, depth=replace(depth, start=now.depth.start, model=now.depth.model)) == now
+    return is_same and now.depth.model != depth.model and now.depth.start in starts
+
+
+def _settings_now(state: AppState, scene: Scene) -> SavedSettings:
+    return replace(settings_of(state.at_rest, scene.size), depth_model=scene.depth_model or "")
+
+
+def _model(settings: SavedSettings) -> tuple[bool, str]:
+    return settings.has_model_depth, settings.depth_model
+
+
+def _read(folder: Path, source: Source) -> tuple[SavedSettings, str] | None:
+    """Return the session of a photo, and why its depth model cannot be used, "" if it can; None without a session."""
     from viewer.model.saved_settings import settings_from_text
 
     path = folder / f"{key_of(source)}.json"
-    return settings_from_text(read_text(path, MAX_BYTES), str(path), is_own=True) if path.is_file() else None
+    if not path.is_file():
+        return None
+    settings, lost = settings_from_text(read_text(path, MAX_BYTES), str(path), is_own=True), ""
+    if settings.depth_model:
+        from iibr_core.depth.models.catalog import wanted_model
+
+        try:
+            wanted_model(settings.depth_model)
+        except InputError as error:
+            lost = words_of(error)
+    return settings, lost
 
 
 def _write(folder: Path, source: Source, settings: SavedSettings) -> None:

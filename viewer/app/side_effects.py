@@ -11,6 +11,7 @@ from pathlib import Path
 
 import typer
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.photo_folder import list_photos
 from iibr_core.scenes.scene import source_beside
 from viewer.app.clipboard import paste_picture
@@ -46,6 +47,7 @@ class SideEffects:
         self._downloads = Newest("iibr-models", download, wake)
         self._masks: list[Path] = []
         self._dialog: Dialog | None = None
+        self._scene_view = scene_view
 
     @property
     def is_waiting(self) -> bool:
@@ -106,6 +108,8 @@ class SideEffects:
                 self._jobs.cancel(id_)
             case tasks.ShowFileTask(path, in_folder):
                 typer.launch(path, locate=in_folder)
+            case tasks.FocusTask(place):
+                return self._focus(place, state)
             case tasks.PlainTask("list models"):
                 self._submit(lambda: do(depth_models.set_known, list_models()))
             case tasks.PlainTask("download model", name):
@@ -123,6 +127,14 @@ class SideEffects:
                 text = self._clipboard_text()  # GLFW answers in the window's thread only
                 self._submit(lambda: do(_open, paste_picture(text)))
         return []
+
+    def _focus(self, place: tuple[float, float], state: AppState) -> list[Action]:
+        scene = state.scene
+        if scene is None:
+            return []
+        x_px, y_px = ((at + 1) / 2 * length - 0.5 for at, length in zip(place, scene.size))
+        disparity = self._scene_view.pick(CENTRE, x_px, y_px)
+        return [] if disparity is None else [do(opening.focus_again, place, disparity)]
 
     def _inputs(self, state: AppState) -> tuple[Path, ...]:
         return (*inputs_of_scene(state), *self._jobs.inputs, *self._masks)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 from urllib.parse import urlsplit
 
-from iibr_core.depth.models.catalog import fetch, known_model, model_here
+from iibr_core.depth.models.catalog import fetch, known_model, list_own_models, model_here
 from iibr_core.depth.models.download import NoConnectionError
 from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
 from iibr_core.runtime.work import Cancelled, watched
@@ -16,7 +17,7 @@ from iibr_core.types import FloatImage, InputError
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import depth_models, messages
 from viewer.model.action import Action, do
-from viewer.model.remedies import DEPTH_COMMANDS, words_of
+from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import Downloading, ModelOffer
 from viewer.model.state.notices import Notice
@@ -51,8 +52,7 @@ class DepthFinder:
         if result is not None and self._asked is not None:
             model, self._asked = self._asked.model, None
             if isinstance(result, Failed):
-                notice = Notice(result.message, is_error=True, commands=DEPTH_COMMANDS)
-                return [do(depth_models.give_up), do(messages.notify, notice)]
+                return [do(depth_models.report_failure, model, result.message)]
             self._found = result
             return [do(depth_models.take_estimate, model)]
         self._start(state, loaded)
@@ -126,8 +126,15 @@ def actions_of_download(result: Action | Failed[str]) -> list[Action]:
 
 
 def list_models() -> tuple[ModelOffer, ...]:
-    """Return the known models. Takes half a second the first time."""
-    return tuple(map(_offer_of, KNOWN_MODELS))
+    """Return the known models and those that were copied here. Takes half a second the first time."""
+    return (*map(_offer_of, KNOWN_MODELS), *(_offer_of_own(name, file) for name, file in list_own_models().items()))
+
+
+def _offer_of_own(name: str, file: Path) -> ModelOffer:
+    megabytes, package = round(file.stat().st_size / MEGABYTE), missing_package("onnx")
+    lacks = f"needs the package {package}" if package else ""
+    words = f"{megabytes:,} MB, your own: {file}"
+    return ModelOffer(name, name, megabytes, "your own", "", words, True, lacks, runs_as_installed=True)
 
 
 def _offer_of(model: KnownModel) -> ModelOffer:
@@ -144,6 +151,7 @@ def _offer_of(model: KnownModel) -> ModelOffer:
         is_here=model_here(model) is not None,
         lacks=f"needs the package {package}" if package else "",
         is_recommended=model.is_recommended,
+        runs_as_installed=model.runs_as_installed,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,7 +30,6 @@ from viewer.model.action import Action, ask, do
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import TOOLS, Tool
-from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
 from viewer.model.state.lens import PRESETS
 from viewer.model.state.preferences import SECTIONS
@@ -172,7 +172,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Reset depth edits", do(depth.reset)),
     Command("Open a depth map…", do(ask, ChooseTask("map"))),
     Command("Get better depth", do(depth_models.get_depth)),
-    Command("Depth models…", do(messages.show_prompt, ModelsPrompt())),
+    Command("Depth models…", do(depth_models.show_models)),
     Command("Save the depth map…", do(saving.ask_to_save, "map")),
     Command("EPI strips", lambda s: do(inspection.show_epis, not s.inspection.shows_epis), "e"),
     Command("All views", lambda s: do(inspection.show_views, not s.inspection.shows_views), "g"),
@@ -235,5 +235,5 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
         case "map" if state.source is not None:
             return do(opening.open_source, source_with_map(state.source, path))
         case "model" | "model folder" if state.source is not None:
-            return do(depth_models.use_model, path)
+            return do(depth_models.use_model, os.path.abspath(os.path.expanduser(path)))
     return do(opening.open_source, source_beside(state.source, path))

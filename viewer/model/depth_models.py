@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.scenes.scene import Scene, source_with_depth
+from viewer.model.messages import notify
+from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import DepthModels, Downloading, ModelOffer
+from viewer.model.state.depth_models import DepthModels, Downloading, ModelOffer, ModelsPrompt
+from viewer.model.state.notices import Notice
 from viewer.model.state.tasks import PlainTask
 
 
@@ -15,23 +18,38 @@ def wanted_model(state: AppState) -> str | None:
     scene, models = _open_photo(state), state.models
     if scene is None or scene.source.path in models.given_up:
         return None
-    choice, usual = scene.source.depth, models.recommended
-    wanted = models.asked or (choice.model if choice.asks_for_model else None)
-    if _is_elsewhere(wanted, models):
-        return None
-    if wanted is None and usual is not None and usual.is_ready:
-        is_unasked = scene.is_guessed and choice.start in ("auto", "embedded") and state.preferences.estimates_depth
-        wanted = usual.name if is_unasked or choice.start == "model" else None
-    return wanted if wanted != scene.depth_model else None
+    choice, wanted = scene.source.depth, models.asked
+    if choice.start == "model" or (scene.is_guessed and choice.start in ("auto", "embedded")):
+        wanted = wanted or choice.model
+        if wanted is None and (choice.start == "model" or not state.preferences.guesses_depth):
+            wanted = usual_model(state)
+    return None if wanted == scene.depth_model or _is_elsewhere(wanted, models) else wanted
+
+
+def usual_model(state: AppState) -> str | None:
+    """Return the model for photos without depth: the chosen one, else the first that is here, None if none is."""
+    ready = (model.name for model in state.models.known if model.is_ready and model.runs_as_installed)
+    return state.preferences.depth_model or next(ready, None)
+
+
+def model_named(models: DepthModels, name: str) -> ModelOffer:
+    """Return the listed model of this name, or the record of a file or folder."""
+    listed = next((model for model in models.known if model.name == name), None)
+    title = name.replace("\\", "/").rstrip("/").rpartition("/")[2]
+    return listed or ModelOffer(name, title, 0, "your own", words=f"Your own: {name}", is_here=True)
 
 
 def offered_model(state: AppState) -> ModelOffer | None:
-    """Return the model that is offered for guessed depth; None if there is no offer."""
+    """Return the model that is offered for guessed depth; None if there is no offer: there is one in a run."""
     scene, models = _open_photo(state), state.models
     if scene is None or not scene.is_guessed or scene.source.depth.start == "rough":
         return None
-    is_busy = models.downloading is not None or wanted_model(state) is not None
-    return None if is_busy or scene.source.path in models.dismissed else models.recommended
+    is_first = models.offered_for is None and state.preferences.offers_models
+    is_offered = is_first or models.offered_for == scene.source.path
+    if not is_offered or models.downloading is not None or wanted_model(state) is not None:
+        return None
+    usual = usual_model(state)
+    return models.recommended if usual is None else model_named(models, usual)
 
 
 def set_known(state: AppState, known: tuple[ModelOffer, ...]) -> AppState:
@@ -48,11 +66,12 @@ def set_downloading(state: AppState, downloading: Downloading | None) -> AppStat
 
 
 def get_depth(state: AppState) -> AppState:
-    """Estimate depth with the recommended model, downloaded if needed, for this photo and all further photos."""
-    offer, scene, models = state.models.recommended, _open_photo(state), state.models
+    """Estimate depth with a model that is here, else download the recommended one; so for all further photos."""
+    scene, models, usual = _open_photo(state), state.models, usual_model(state)
+    offer = models.recommended if usual is None else model_named(models, usual)
     if offer is None or offer.lacks:
         return state
-    state = replace(state, preferences=replace(state.preferences, estimates_depth=True))
+    state = replace(state, preferences=replace(state.preferences, guesses_depth=False))
     if scene is not None:
         asked = offer.name if not scene.is_guessed else models.asked
         models = replace(models, asked=asked, given_up=models.given_up - {scene.source.path})
@@ -65,43 +84,67 @@ def use_model(state: AppState, model: str) -> AppState:
     scene, models = _open_photo(state), state.models
     if scene is None:
         return state
-    if models.recommended is not None and model == models.recommended.name and not models.recommended.is_here:
-        return get_depth(state)
     state = replace(state, models=replace(models, asked=model, given_up=models.given_up - {scene.source.path}))
     return state.with_tasks(PlainTask("download model", model)) if _is_elsewhere(model, models) else state
 
 
+def show_models(state: AppState) -> AppState:
+    """Show the list of models, as they are now."""
+    return replace(state, prompt=ModelsPrompt()).with_tasks(PlainTask("list models"))
+
+
 def show_offer(state: AppState, is_shown: bool) -> AppState:
-    """Offer the recommended model for the open photo, or close the offer for this run."""
-    scene, models = _open_photo(state), state.models
+    """Offer a model for the open photo, or close the offer for this run."""
+    scene = _open_photo(state)
     if scene is None:
         return state
-    path = frozenset({scene.source.path})
-    return replace(
-        state, models=replace(models, dismissed=models.dismissed - path if is_shown else models.dismissed | path)
-    )
+    return replace(state, models=replace(state.models, offered_for=scene.source.path if is_shown else ""))
+
+
+def offer_no_more(state: AppState) -> AppState:
+    """Close the offer for good; the chip of guessed depth still leads to it."""
+    return show_offer(replace(state, preferences=replace(state.preferences, offers_models=False)), False)
 
 
 def give_up(state: AppState) -> AppState:
     """Keep the depth that the open photo has, and close the offer of a model."""
-    scene, models = _open_photo(state), state.models
+    scene = _open_photo(state)
     if scene is None:
         return state
-    given_up, dismissed = (paths | {scene.source.path} for paths in (models.given_up, models.dismissed))
-    return replace(state, models=replace(models, asked=None, given_up=given_up, dismissed=dismissed))
+    given_up = state.models.given_up | {scene.source.path}
+    return show_offer(replace(state, models=replace(state.models, asked=None, given_up=given_up)), False)
+
+
+def report_failure(state: AppState, model: str, message: str) -> AppState:
+    """Show why a model failed on the open photo; photos to come do not try it again unasked."""
+    preferences, source = state.preferences, state.source
+    if preferences.depth_model == model:
+        state = replace(state, preferences=replace(preferences, depth_model=""))
+    state = give_up(state)
+    if source is not None and state.scene is not None and source.depth.model == model:
+        source = replace(source, depth=replace(source.depth, model=None))
+        state = replace(state, source=source, scene=replace(state.scene, source=source))
+    return notify(state, Notice(message, is_error=True, commands=DEPTH_COMMANDS[1:], failed_model=model))
 
 
 def take_estimate(state: AppState, model: str) -> AppState:
-    """Make the views again from the depth that this model estimated. A model that was chosen stays the photo's own."""
-    scene, models = _open_photo(state), state.models
+    """Make the views again from the depth that this model estimated. A model that was chosen stays the photo's own, and
+    serves all further photos.
+    """
+    scene, models, preferences = _open_photo(state), state.models, state.preferences
     if scene is None:
         return state
-    source = scene.source if models.asked is None else source_with_depth(scene.source, "model", model)
+    source = scene.source
+    if models.asked is not None:
+        source = source_with_depth(source, source.depth.start if scene.is_guessed else "model", model)
+        preferences = replace(preferences, depth_model=model, guesses_depth=False)
     return replace(
         state,
         source=source,
         scene=replace(scene, source=source, depth_model=model),
         models=replace(models, asked=None),
+        notices=tuple(notice for notice in state.notices if not notice.failed_model),
+        preferences=preferences,
         generation=state.generation + 1,
         stopped=None,
     )

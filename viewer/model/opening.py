@@ -12,10 +12,12 @@ from pathlib import PurePath
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
-from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source, source_with_depth
 from iibr_core.types import InputError
 from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, with_focus_of
 from viewer.model.demo_photo import is_ours
+from viewer.model.depth_models import offered_model
+from viewer.model.focal_plane import focus_on
 from viewer.model.history import map_optics, undoable
 from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.remedies import DEPTH_COMMANDS
@@ -23,7 +25,7 @@ from viewer.model.state.app_state import AppState, History
 from viewer.model.state.folder import PhotoFacts
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.tasks import PlainTask
+from viewer.model.state.tasks import FocusTask, PlainTask
 from viewer.model.state.viewpoint import Motion
 
 MAX_RECENT = 8
@@ -32,12 +34,13 @@ RESTORED = "Restored as you left it. Ctrl+Z resets."
 
 def open_source(state: AppState, source: Source) -> AppState:
     """Open a photo or a light field in place of the open scene, which stays until the new one is read."""
+    offered_for = state.models.offered_for if offered_model(state) is None else ""
     return replace(
         state,
         source=source,
         progress=Progress(doing=f"reading {PurePath(source.path).name}"),
         generation=state.generation + 1,
-        models=replace(state.models, asked=None, left_focus=None),
+        models=replace(state.models, asked=None, left_focus=None, offered_for=offered_for),
         free_camera=None,
         prompt=None,
     )
@@ -108,9 +111,11 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
         inspection=replace(state.inspection, probe=None),
     )
     if old is None or not is_same:
-        return _begin_scene(shown, old, scene)
-    shown = shown if new_depth is None else _with_left_focus(shown)
-    return _add_notices(shown, scene) if old.is_sketch and not scene.is_sketch else shown
+        shown = _begin_scene(shown, old, scene)
+    else:
+        shown = shown if new_depth is None else _with_left_focus(shown)
+        shown = _add_notices(shown, scene) if old.is_sketch and not scene.is_sketch else shown
+    return shown
 
 
 @undoable
@@ -120,24 +125,51 @@ def take_settings(state: AppState, settings: SavedSettings) -> AppState:
 
 
 @undoable
-def restore_session(state: AppState, settings: SavedSettings) -> AppState:
-    """Restore what the open photo was left with: the lens, the depth edits, and the depth strength."""
+def restore_session(state: AppState, settings: SavedSettings, lost: str = "") -> AppState:
+    """Restore what the open photo was left with: the lens, the depth edits, the depth strength, and its depth model.
+
+    lost: reason why the model cannot be used, "" if it can. The place in focus then stays sharp at its depth now.
+    """
     scene, restored = state.scene, _with_settings(state, settings)
     if scene is None or restored is state:
         return state
     has_aperture = settings.optics.aperture_diameter > 0
     restored = replace(restored, chosen_focus=restored.optics.focus_disparity, has_chosen_aperture=has_aperture)
-    if settings.has_model_depth and scene.is_guessed:  # the focus belongs to another depth than this
-        models = replace(state.models, left_focus=settings.optics_at(scene.width))
+    restored = replace(restored, focused_at=settings.focused_at)
+    has_other_model = settings.depth_model not in ("", scene.depth_model)
+    if has_other_model or (settings.has_model_depth and scene.is_guessed):  # the focus belongs to another depth
         optics = with_focus_of(restored.optics, Optics())
-        restored = replace(restored, optics=optics, chosen_focus=None, models=models)
+        restored = replace(restored, optics=optics, chosen_focus=None)
+        if lost and settings.focused_at is not None:
+            restored = restored.with_tasks(FocusTask(settings.focused_at))
+        elif not lost:
+            restored = _with_depth_model(restored, scene, settings)
     if scene.plan is None:
         return restored
     depth = DepthSettings(settings.source.depth.refine, settings.depth_edits)
     if (depth, settings.depth_strength) != (state.depth, state.depth_strength):
         restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
         restored = replace(restored, generation=state.generation + 1)
-    return notify(restored, Notice(RESTORED))
+    words = f"Restored as you left it, except for its depth: {lost}." if lost else RESTORED
+    return notify(restored, Notice(words, commands=DEPTH_COMMANDS if lost else ()))
+
+
+def _with_depth_model(state: AppState, scene: Scene, settings: SavedSettings) -> AppState:
+    """Return the state in which the session's model is to estimate depth, and the session's focus waits for that."""
+    source = scene.source
+    if settings.depth_model:
+        start = source.depth.start if scene.is_guessed else "model"
+        source = source_with_depth(source, start, settings.depth_model)
+    models = replace(state.models, left_focus=settings.optics_at(scene.width))
+    return replace(state, source=source, scene=replace(scene, source=source), models=models)
+
+
+def focus_again(state: AppState, place: tuple[float, float], disparity: float) -> AppState:
+    """Make the place that a photo was left focused on sharp at the depth that it has now."""
+    if state.scene is None:
+        return state
+    optics = clamp_optics(focus_on(state.optics, place, disparity), state.scene)
+    return replace(state, optics=optics, chosen_focus=optics.focus_disparity, focused_at=place)
 
 
 def set_facts(state: AppState, facts: PhotoFacts) -> AppState:

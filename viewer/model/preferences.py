@@ -31,9 +31,9 @@ def show_filmstrip(state: AppState, is_shown: bool) -> AppState:
     return replace(state, preferences=replace(state.preferences, shows_filmstrip=is_shown))
 
 
-def estimate_depth_always(state: AppState, is_wanted: bool) -> AppState:
-    """Decide whether each photo without depth gets it from the recommended model."""
-    return replace(state, preferences=replace(state.preferences, estimates_depth=is_wanted))
+def guess_depth_always(state: AppState, is_wanted: bool) -> AppState:
+    """Decide whether photos without depth keep a guess although a model is here."""
+    return replace(state, preferences=replace(state.preferences, guesses_depth=is_wanted))
 
 
 def toggle_section(state: AppState, section: Section) -> AppState:

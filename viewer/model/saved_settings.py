@@ -47,6 +47,7 @@ MAX_STROKES = 10_000
 
 SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
+Place = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 
 
 class SourceText(msgspec.Struct, frozen=True, kw_only=True):
@@ -78,6 +79,8 @@ class SettingsText(FormatText, frozen=True, kw_only=True, omit_defaults=True):
     depth_edits: DepthEdits = UNEDITED
     has_model_depth: bool = False
     view_width: SidePx | None = None
+    focused_at: tuple[Place, Place] | None = None
+    depth_model: str = ""
 
 
 def settings_text(settings: SavedSettings) -> str:

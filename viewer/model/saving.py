@@ -96,6 +96,7 @@ def settings_of(state: AppState, size_px: ScreenSize) -> SavedSettings:
         state.depth.edits,
         has_model_depth=scene is not None and scene.has_model_depth,
         view_width=scene.width if scene is not None else None,
+        focused_at=state.focused_at,
     )
 
 

@@ -29,9 +29,10 @@ from iibr_core.types import InputError, Photo
 class LocalModel:
     """A model on this machine. weights: its file and the files beside it that hold its numbers, or those in a folder.
 
-    is_meaning_known: whether the meaning of its estimates is certain.
+    name: finds it, a path for files and folders. is_meaning_known: whether the meaning of its estimates is certain.
     """
 
+    name: str
     title: str
     folder: Path
     runner: Runner
@@ -70,17 +71,25 @@ def known_model(name: str) -> KnownModel:
 
 
 def model_to_use(choice: DepthChoice) -> LocalModel | None:
-    """Return the model that the user wants; without a wish, the usual one if it is ready, else None.
+    """Return the model that the user wants; without a wish, a model that is ready, None if there is none.
 
     Raises InputError if the wanted one is not here, or lacks its package.
     """
     if choice.model is not None:
-        return _wanted_model(choice.model)
-    usual = known_model(USUAL_MODEL)
-    found = None if usual.needs else model_here(usual)
+        return wanted_model(choice.model)
+    found = model_at_hand()
     if found is None and choice.asks_for_model:
         raise FixableError(f"the depth model {USUAL_MODEL} is not on this machine", Remedy.DEPTH)
     return found
+
+
+def model_at_hand() -> LocalModel | None:
+    """Return the first published model that is here and runs as installed, else the first copied one, None if none."""
+    runnable = (model_here(model) for model in KNOWN_MODELS if model.runs_as_installed and not model.needs)
+    found = next((model for model in runnable if model is not None), None)
+    if found is not None or missing_package("onnx"):
+        return found
+    return next((wanted_model(name) for name in list_own_models()), None)
 
 
 def model_here(model: KnownModel) -> LocalModel | None:
@@ -88,7 +97,7 @@ def model_here(model: KnownModel) -> LocalModel | None:
     folder = local_folder(model)
     if not all((folder / name).is_file() for name in model.files):
         return None
-    return LocalModel(model.title, folder, model.runner, (folder / model.files[-1],))
+    return LocalModel(model.name, model.title, folder, model.runner, (folder / model.files[-1],))
 
 
 def fetch(model: KnownModel) -> LocalModel:
@@ -118,7 +127,7 @@ def register(path: Path) -> LocalModel:
     Nothing happens if the same file is there already. Raises InputError if it is no model that takes one picture, its
     name is taken, or it cannot be written.
     """
-    model = _wanted_model(str(path))
+    model = wanted_model(str(path))
     if model.runner != "onnx":
         raise InputError(f"{path}: only ONNX files are copied; use this folder itself as the depth model")
     file = model.weights[0].resolve()
@@ -138,22 +147,25 @@ def register(path: Path) -> LocalModel:
                 shutil.copyfile(source, unfinished / target)
     elif not copy.is_file() or not filecmp.cmp(file, copy, shallow=False):
         raise InputError(f"{copy.parent}: another model has this name; rename {file}, or delete that folder")
-    return _wanted_model(name)
+    return wanted_model(name)
 
 
-def _wanted_model(wanted: str) -> LocalModel:
-    """Return the model in a folder, of an ONNX file, or of the name of a copied or a known one."""
+def wanted_model(wanted: str) -> LocalModel:
+    """Return the model in a folder, of an ONNX file, or of the name of a copied or a known one.
+
+    Raises InputError if there is none, or it lacks its package.
+    """
     path = Path(os.path.expanduser(wanted))
     if path.is_dir():
-        found = _model_in(path)
+        found = _model_in(path, wanted)
     elif path.suffix.lower() == ".onnx" and path.is_file():
-        found = _onnx_model(path, f"the model {path.name}")
+        found = _onnx_model(path, wanted, f"the model {path.name}")
     elif path.is_file():
         raise InputError(f"{path}: is not an ONNX file; give one, a model folder, or the name of a known model")
     elif "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
         raise InputError(f"{wanted}: no such file or folder")
     elif wanted in (copied := list_own_models()):
-        found = _onnx_model(copied[wanted], f"the model {wanted}")
+        found = _onnx_model(copied[wanted], wanted, f"the model {wanted}")
     else:
         return _known_model_here(known_model(wanted))
     _require_package(found.runner, found.title)
@@ -175,7 +187,7 @@ def _require_package(runner: Runner, title: str) -> None:
         raise InputError(f"{title} needs the package {package}")
 
 
-def _model_in(folder: Path) -> LocalModel:
+def _model_in(folder: Path, name: str) -> LocalModel:
     """Return the model in a user's folder."""
     title, config = f"the model in {folder.name or folder}", read_object(folder / CONFIG)
     kind, files = config.get("model_type"), sorted([*folder.glob("*.onnx"), *folder.glob("onnx/*.onnx")])
@@ -184,13 +196,13 @@ def _model_in(folder: Path) -> LocalModel:
         if 1 not in (len(files), len(full)):
             names = ", ".join(file.name for file in files[:3])
             raise InputError(f"{folder}: holds several ONNX files ({names}); give one of them")
-        return _onnx_model((full or files)[0], title)
+        return _onnx_model((full or files)[0], name, title)
     if not config:
         raise InputError(f"{folder}: holds no {CONFIG}; get the whole model folder")
     if kind not in torch_models.PREPARATIONS and "unidepth" not in str(config).lower():
         raise InputError(f"{folder}: no known models are of its type, {kind!r}")
     runner: Runner = "transformers" if kind in torch_models.PREPARATIONS else "unidepth"
-    return LocalModel(title, folder, runner, torch_models.safetensors_in(folder))
+    return LocalModel(name, title, folder, runner, torch_models.safetensors_in(folder))
 
 
 def _require_use(found: DepthEstimate, title: str) -> None:
@@ -203,7 +215,7 @@ def _require_use(found: DepthEstimate, title: str) -> None:
         raise InputError(f"{title} gave the same depth everywhere")
 
 
-def _onnx_model(file: Path, title: str) -> LocalModel:
+def _onnx_model(file: Path, name: str, title: str) -> LocalModel:
     """Return the model of an ONNX file. The hub lays such files out in a folder "onnx" below their settings."""
     folder = file.parent.parent if file.parent.name == "onnx" else file.parent
-    return LocalModel(title, folder, "onnx", (file, *onnx.external_files(file)), is_meaning_known=False)
+    return LocalModel(name, title, folder, "onnx", (file, *onnx.external_files(file)), is_meaning_known=False)

@@ -41,6 +41,11 @@ class KnownModel:
         return CONFIG, PREPROCESSOR, "onnx/model.onnx" if self.runner == "onnx" else "model.safetensors"
 
     @property
+    def runs_as_installed(self) -> bool:
+        """Return whether it runs without optional packages."""
+        return self.runner == "onnx"
+
+    @property
     def is_recommended(self) -> bool:
         """Return whether it is the model to begin with."""
         return self.name == USUAL_MODEL

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.models import cache as estimate_cache
-from iibr_core.depth.models.catalog import fetch, known_model, model_here
+from iibr_core.depth.models.catalog import fetch, known_model, model_here, register
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.scenes.scene import Source, source_beside
@@ -119,7 +120,6 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
     assert (state.optics.eye, state.optics.aperture_diameter) == (ViewOffset(0.5, -0.5), 1.0)
     assert sharp_disparity(state.optics, at) == pytest.approx(square, abs=0.02), "what was sharp is sharp"
     assert state.depth.edits == edits == viewer.app.scene_view.loaded.depth_settings.edits  # type: ignore[union-attr]
-    assert state.preferences.estimates_depth
     assert offered_model(state) is None
     viewer.app.do(do(history.undo), do(history.undo))
     viewer.until_idle()
@@ -157,12 +157,13 @@ def test_without_a_connection_a_download_says_so_with_details(viewer: Driver, mo
     assert viewer.app.state.models.downloading is None
 
 
-def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opener, tmp_path: Path) -> None:
-    driver = with_offer(open_window(write_photo(tmp_path / "photo.png"), grid=GRID))
-    assert depth_kind(driver.app) == "rough", "nobody asked for it yet"
-    driver.press(ESTIMATE, "notices")
+def test_a_model_that_is_here_is_used_unasked_unless_that_is_switched_off(
+    downloaded: Hub, open_window: Opener, tmp_path: Path
+) -> None:
+    driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
     driver.until(is_deep)
     driver.until_idle()
+    assert offered_model(driver.app.state) is None
     source = source_beside(driver.app.state.source, str(write_photo(tmp_path / "other.png", seed=9)))
     seen: list[str | None] = []
     driver.app.do(do(opening.open_source, source))
@@ -175,16 +176,34 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
     driver.until(is_next_deep)
     assert seen[0] == "rough", "the guess comes first"
     assert not downloaded.asked
-    driver.app.do(do(preferences.estimate_depth_always, False))
+    driver.app.do(do(preferences.guess_depth_always, True))
     third = source_beside(source, str(write_photo(tmp_path / "third.png", seed=99)))
     driver.app.do(do(opening.open_source, third))
     with_offer(driver)
     assert depth_kind(driver.app) == "rough"
+    driver.press(ESTIMATE, "notices")
+    driver.until(is_deep)
 
 
-def test_the_offer_is_dismissed_for_this_photo_and_comes_back_by_the_badge(viewer: Driver, tmp_path: Path) -> None:
+def open_another(driver: Driver, path: Path) -> None:
+    """Open a photo by its name, and wait until it is all there."""
+    driver.app.do(do(opening.open_source, Source(str(path), grid=GRID)))
+    driver.until(lambda app: app.state.scene is not None and app.state.scene.source.path == str(path))
+    driver.until_idle()
+
+
+def test_a_model_is_offered_once_in_a_run_and_comes_back_by_the_badge(viewer: Driver, tmp_path: Path) -> None:
+    open_another(viewer, write_photo(tmp_path / "other.png", seed=9))
+    assert offered_model(viewer.app.state) is None
+    viewer.press("Depth guessed", "Depth guessed")
+    viewer.until(lambda app: offered_model(app.state) is not None)
     viewer.press("×##offer", "notices")
     viewer.until(lambda app: offered_model(app.state) is None)
+    viewer.press("Depth guessed", "Depth guessed")
+    viewer.until(lambda app: offered_model(app.state) is not None)
+    viewer.press("Don't offer again", "notices")
+    viewer.until(lambda app: not app.state.preferences.offers_models)
+    assert offered_model(viewer.app.state) is None
     viewer.press("Depth guessed", "Depth guessed")
     viewer.until(lambda app: offered_model(app.state) is not None)
     viewer.app.do(do(preferences.set_font_scale, 2.3))
@@ -193,7 +212,7 @@ def test_the_offer_is_dismissed_for_this_photo_and_comes_back_by_the_badge(viewe
 
 
 def test_a_running_estimate_is_given_up_by_one_click(
-    downloaded: Hub, viewer: Driver, monkeypatch: pytest.MonkeyPatch
+    downloaded: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def wait_to_be_stopped(source: Source, loaded: object, refine: float) -> None:
         while not is_stopped():
@@ -203,7 +222,7 @@ def test_a_running_estimate_is_given_up_by_one_click(
     is_running = Event()
     with monkeypatch.context() as patched:
         patched.setattr("iibr_core.scenes.photo.deepen", wait_to_be_stopped)
-        viewer.press(ESTIMATE, "notices")
+        viewer = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
         viewer.until(lambda app: is_running.is_set())
         viewer.press("Cancel##estimate", "notices")
         viewer.until(lambda app: depth_models.wanted_model(app.state) is None)
@@ -230,7 +249,64 @@ def test_a_model_file_of_ones_own_is_used_in_place_and_a_broken_one_leaves_the_d
     assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.5)
     assert viewer.app.state.source is not None
     assert viewer.app.state.source.depth.model == str(file)
-    assert not viewer.app.state.preferences.estimates_depth
+    assert not viewer.app.state.notices, "what failed before is no news"
+    for name, seed in (("second.png", 9), ("third.png", 99)):
+        open_another(viewer, write_photo(tmp_path / name, seed=seed))
+        viewer.until(is_deep)
+        assert viewer.app.state.scene is not None
+        assert viewer.app.state.scene.depth_model == str(file)
+
+
+def test_a_copied_model_is_listed_and_used_for_photos_without_depth(
+    hub: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after `iibr models get FILE.onnx`."""
+    monkeypatch.setattr("iibr_core.depth.models.catalog.own_models_folder", lambda: tmp_path / "copied")
+    register(weighing(tmp_path / "mine.onnx", (1, 1, 1)))
+    driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
+    driver.until(is_deep)
+    assert driver.app.state.scene is not None
+    assert driver.app.state.scene.depth_model == "mine"
+    driver.app.do(do(depth_models.show_models))
+    driver.until_idle()
+    assert any(model.name == "mine" and model.is_ready for model in driver.app.state.models.known)
+
+
+@pytest.mark.parametrize("is_lost", [False, True])
+def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
+    hub: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_lost: bool
+) -> None:
+    """If the model's file is gone, the message says so, and the place in focus stays sharp."""
+    monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
+    photo, kept = write_photo(tmp_path / "photo.png"), tmp_path / "kept"
+    file = weighing(tmp_path / "own.onnx", (1, 1, 1))
+    first = with_offer(open_window(photo, kept_in=kept, grid=GRID))
+    first.app.do(do(depth_models.use_model, str(file)))
+    first.until(is_deep)
+    first.until(lambda app: bool(list((kept / "sessions").glob("*.json"))))
+    at = place_of(50, 20, first.app.state.scene)  # type: ignore[arg-type]
+    sharp = first.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
+    first.app.do(do(lens.focus_on, at, sharp or 0.0), do(gesture.end_gesture))
+    first.until_idle()
+    left = first.app.state.optics
+    first.app.do(do(depth_models.use_model, MODEL.name))  # chosen for all photos, but it never comes
+    first.app.close()
+    if is_lost:
+        file.unlink()
+    second = open_window(photo, kept_in=kept, grid=GRID)
+    second.app.state = replace(second.app.state, preferences=replace(second.app.state.preferences, depth_model=""))
+    second.until(lambda app: bool(app.state.notices))
+    (notice,) = second.app.state.notices
+    assert ("own.onnx" in notice.text) == is_lost
+    if not is_lost:
+        second.until(is_deep)
+        second.until_idle()
+        assert second.app.state.optics == left
+        return
+    second.until(lambda app: app.state.chosen_focus is not None)
+    assert depth_kind(second.app) == "rough"
+    now = second.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
+    assert sharp_disparity(second.app.state.optics, at) == pytest.approx(now, abs=0.02)
 
 
 def test_a_photo_opens_with_the_focus_that_it_was_left_with(
@@ -238,8 +314,7 @@ def test_a_photo_opens_with_the_focus_that_it_was_left_with(
 ) -> None:
     monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
     photo, kept = write_photo(tmp_path / "photo.png"), tmp_path / "kept"
-    first = with_offer(open_window(photo, kept_in=kept, grid=GRID))
-    first.press(ESTIMATE, "notices")
+    first = open_window(photo, kept_in=kept, grid=GRID)
     first.until(is_deep)
     first.until_idle()
     assert not list((kept / "sessions").glob("*.json")), "the user did nothing yet"
@@ -248,7 +323,6 @@ def test_a_photo_opens_with_the_focus_that_it_was_left_with(
     left = first.app.state.optics
     first.app.close()
     second = open_window(photo, kept_in=kept, grid=GRID)
-    assert second.app.state.preferences.estimates_depth
     second.until(is_deep)
     second.until_idle()
     assert second.app.state.optics == left

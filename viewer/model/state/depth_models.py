@@ -9,8 +9,9 @@ from iibr_core.beyond.optics import Optics
 
 @dataclass(frozen=True)
 class ModelOffer:
-    """A known depth model. host: source of its download. words: one line about it. is_here: whether it is on this
-    machine. lacks: end of a sentence that names a missing package, "" where none is missing.
+    """A depth model that is known or was copied here. host: source of its download. words: one line about it. is_here:
+    whether it is on this machine. lacks: end of a sentence that names a missing package, "" where none is missing.
+    runs_as_installed: whether it needs no optional package.
     """
 
     name: str
@@ -22,6 +23,7 @@ class ModelOffer:
     is_here: bool = False
     lacks: str = ""
     is_recommended: bool = False
+    runs_as_installed: bool = False
 
     @property
     def is_ready(self) -> bool:
@@ -50,15 +52,16 @@ class DepthModels:
     """Known depth models, and the choice of the user.
 
     known: () before they were listed. asked: name or path of the model that was chosen for the open photo, None
-    without. dismissed: paths of photos whose offer was closed in this run. given_up: paths of photos whose estimate
-    was stopped or failed. left_focus: focus of the session, if it belongs to the depth that is still to be estimated.
+    without. offered_for: path of the photo that a model is offered for, None before the first offer. given_up: paths of
+    photos whose estimate was stopped or failed. left_focus: focus of the session, if it belongs to the depth that is
+    still to be estimated.
     """
 
     known: tuple[ModelOffer, ...] = ()
     asked: str | None = None
     downloading: Downloading | None = None
     left_focus: Optics | None = None
-    dismissed: frozenset[str] = frozenset()
+    offered_for: str | None = None
     given_up: frozenset[str] = frozenset()
 
     @property

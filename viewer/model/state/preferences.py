@@ -47,9 +47,10 @@ class Preferences:
 
     window: x, y, width, height in screen units, None before the first one; is_maximized: whether it filled the screen.
     last_folder: of the last saved or exported file, "" before the first; opened_folder: of the last opened photo.
-    estimates_depth: whether photos without depth get it from the recommended model once that is downloaded. tracker:
-    address of the tracker of the head. head_range_cm: movement of the head from the middle to the outermost views.
-    stereo_monitor: chosen last; None for any.
+    depth_model: name or path of the model that was chosen for all photos, "" for any that is here. guesses_depth:
+    whether photos without depth keep a guess although a model is here. offers_models: whether the first guess of a run
+    comes with the offer of a model. tracker: address of the tracker of the head. head_range_cm: movement of the head
+    from the middle to the outermost views. stereo_monitor: chosen last; None for any.
     """
 
     theme: Theme = "dark"
@@ -60,7 +61,9 @@ class Preferences:
     shows_filmstrip: bool = False
     folder_order: FolderOrder = "name"
     units: Units = "photographic"
-    estimates_depth: bool = False
+    depth_model: str = ""
+    guesses_depth: bool = False
+    offers_models: bool = True
     last_folder: str = ""
     opened_folder: str = ""
     tracker: str = "udp:127.0.0.1:4242"

@@ -79,4 +79,14 @@ class ShowFileTask:
     in_folder: bool = False
 
 
-Task = PlainTask | ChooseTask | TakePathTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask | ShowFileTask
+@dataclass(frozen=True)
+class FocusTask:
+    """Focus on what is seen now at a place, (x, y) from -1 to 1 across the picture, y down."""
+
+    place: tuple[float, float]
+
+
+Task = (
+    PlainTask | ChooseTask | TakePathTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask | ShowFileTask
+    | FocusTask
+)  # fmt: skip

@@ -20,14 +20,18 @@ MAX_LIST_SHARE = 0.55
 
 def models_prompt(prompt: ModelsPrompt, state: AppState) -> list[Action]:
     """Build a row for each model, and buttons for the selected model."""
-    models = state.models.known
+    models, usual = state.models.known, depth_models.usual_model(state)
+    if usual is not None and models and all(model.name != usual for model in models):
+        models += (depth_models.model_named(state.models, usual),)
     imgui.text("Depth models")
     gap()
     if not models:
         quiet("Looking for models…")
-    recommended = next((i for i, model in enumerate(models) if model.is_recommended), 0)
-    selected = recommended if prompt.selected is None else prompt.selected
-    pressed = _rows(models, selected)
+    models = tuple(sorted(models, key=lambda model: not model.is_here))
+    places = {model.name: i for i, model in enumerate(models)}
+    usual = usual or next((model.name for model in models if model.is_recommended), "")
+    selected = places.get(usual, 0) if prompt.selected is None else prompt.selected
+    pressed = _rows(models, selected, state.preferences.depth_model)
     gap()
     close = do(messages.show_prompt, None)
     taken = button_rows([*_buttons(state, models[selected] if models else None), ("Cancel", close)])
@@ -50,8 +54,8 @@ def _buttons(state: AppState, model: ModelOffer | None) -> list[tuple[str, Actio
     return buttons
 
 
-def _rows(models: tuple[ModelOffer, ...], selected: int) -> int | None:
-    """Build the rows and return the index of the row that was pressed."""
+def _rows(models: tuple[ModelOffer, ...], selected: int, chosen: str) -> int | None:
+    """Build the rows and return the index of the row that was pressed. chosen: name of the model for all photos."""
     style, pressed = imgui.get_style(), None
     width = imgui.get_content_region_avail().x - style.scrollbar_size - style.item_spacing.x
     line, padding = imgui.get_text_line_height(), style.item_inner_spacing.y
@@ -64,7 +68,8 @@ def _rows(models: tuple[ModelOffer, ...], selected: int) -> int | None:
             pressed = i
         end = imgui.get_cursor_pos()
         imgui.set_cursor_pos(imgui.ImVec2(start.x + padding, start.y + padding))
-        imgui.text(f"{model.title} (downloaded)" if model.is_here else model.title)
+        where = "used for all photos" if model.name == chosen else "here" if model.is_here else ""
+        imgui.text(f"{model.title} ({where})" if where else model.title)
         imgui.set_cursor_pos(imgui.ImVec2(start.x + padding, start.y + padding + line))
         imgui.push_text_wrap_pos(start.x + width)
         (imgui.text_wrapped if i == selected else quiet)(model.words)  # quiet words fade on the selected row's colour

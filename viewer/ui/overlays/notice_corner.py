@@ -19,7 +19,7 @@ from viewer.model.state.prompts import WRITING, JobKind, JobProgress
 from viewer.model.state.tasks import CancelJobTask, ChooseTask, PlainTask
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, colored, gap, last_part, quiet, scale, tooltip
+from viewer.ui.widgets import button, colored, gap, quiet, scale, tooltip
 
 NOTICE_WIDTH = 420.0
 MIN_WIDTH, MIN_HEIGHT = 160.0, 40.0
@@ -99,20 +99,19 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
 
 def _offer(model: ModelOffer) -> list[Action]:
     """Draw the offer of better depth in place of a guess."""
-    words, verb = f"{model.title} is on this machine and estimates it better.", "Estimate depth"
+    words, verb = f"Depth is guessed. {model.title} is here.", "Estimate depth"
     if model.lacks:
-        words = f"{model.title}: {model.lacks}"
+        words = f"Depth is guessed. {model.title}: {model.lacks}"
     elif not model.is_here:
-        words = f"{model.title} estimates it better: {model.megabytes:,} MB, {model.licence}, from {model.host}."
+        words = f"Depth is guessed. {model.title}: {model.megabytes:,} MB, {model.licence}, {model.host}"
         verb = "Get better depth"
     actions: list[Action] = [do(depth_models.show_offer, False)] if imgui.button("×##offer") else []
     imgui.same_line()
     imgui.begin_group()
     imgui.align_text_to_frame_padding()
-    imgui.text_wrapped("Depth is guessed: near and far may be wrong.")
     quiet(words)
-    if not model.lacks:
-        actions += button_rows([(verb, do(depth_models.get_depth))])
+    offers = [] if model.lacks else [(verb, do(depth_models.get_depth))]
+    actions += button_rows([*offers, ("Don't offer again", do(depth_models.offer_no_more))])
     imgui.end_group()
     return actions
 
@@ -169,6 +168,5 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
             "download", f"Downloading {downloading.title}", words, share, do(ask, PlainTask("stop download"))
         )
     if model is not None:
-        titles = {offer.name: offer.title for offer in state.models.known}
-        words = f"with {titles.get(model, last_part(model))}"
+        words = f"with {depth_models.model_named(state.models, model).title}"
         yield ProgressRow("estimate", "Estimating depth", words, 0.0, do(depth_models.give_up))

@@ -9,11 +9,10 @@ from imgui_bundle import imgui
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import GAMMA_LIMITS, UNEDITED
 from iibr_core.scenes.scene import Scene, source_with_depth
-from viewer.model import depth, depth_models, inspection, messages, opening, preferences, saving
+from viewer.model import depth, depth_models, inspection, opening, preferences, saving
 from viewer.model.action import Action, ask, do
 from viewer.model.remedies import BETTER_DEPTH
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.depth_brush import brush_rows, selection_rows
 from viewer.ui.sections.depth_histogram import depth_histogram
@@ -58,7 +57,7 @@ OPEN_TIP = "Open a depth map for this photo: PFM, EXR, NPY or 16-bit PNG."
 SAVE_TIP = "Save depth with all edits. A map beside the photo is found again the next time."
 RESET_TIP = "Remove all edits of depth."
 OTHER_MODELS = "Depth models…", "All depth models, and model files of your own."
-ESTIMATES_TIP = "Estimate depth of photos without depth with the recommended model. Until then, it is guessed."
+ESTIMATES_TIP = "Estimate the depth of photos without depth with the model that was chosen last, once it is here."
 
 
 def depth_line(scene: Scene) -> None:
@@ -118,7 +117,7 @@ def _source(state: AppState) -> list[Action]:
     if picked is None:
         return []
     if picked == len(starts):
-        return [do(messages.show_prompt, ModelsPrompt())]
+        return [do(depth_models.show_models)]
     start, model = starts[picked]
     if model is not None:
         return [do(depth_models.use_model, model)]
@@ -158,6 +157,6 @@ def _files(state: AppState) -> list[Action]:
     imgui.same_line(0, SPACING * scale())
     if button("Reset", RESET_TIP, state.depth.edits != UNEDITED):
         actions.append(do(depth.reset))
-    is_wanted = state.preferences.estimates_depth
-    estimates = checkbox("Estimate depth of new photos", is_wanted, ESTIMATES_TIP)
-    return actions + edit(preferences.estimate_depth_always, is_wanted, estimates)
+    guesses = state.preferences.guesses_depth
+    estimates = checkbox("Estimate depth of new photos", not guesses, ESTIMATES_TIP)
+    return actions + edit(preferences.guess_depth_always, guesses, not estimates)
