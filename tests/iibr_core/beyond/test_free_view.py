@@ -6,6 +6,7 @@ import pytest
 from iibr_core.beyond import free_cameras, free_view
 from iibr_core.beyond.free_view import render_free_view, target_from_photo
 from iibr_core.beyond.landed_squares import CORNERS, SAMPLES, draw_rays, rows_landed_on
+from iibr_core.inpainting.background import fill_background
 from iibr_core.method.rays import NO_MARGINS, rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.types import Camera, ImageSize, InputError, ViewOffset
@@ -77,6 +78,18 @@ def test_what_is_made_up_never_hides_what_the_photo_shows():
     view = free_cameras.FreeViews(pixels, inverse_depth, here, [here, *beside]).view(here)
     np.testing.assert_allclose(view.colors[15:25, 5:15], pixels[15:25, 5:15], atol=2e-6)
     assert not view.inpainted.any()
+
+
+@pytest.mark.parametrize("inpainter", [fill_background, None], ids=["once for all", "each view"])
+def test_holes_show_what_lies_behind_and_never_the_foreground(inpainter):
+    pixels, inverse_depth = square_scene()
+    pixels[:], pixels[inverse_depth > 0.5] = (0.2, 0.2, 0.8), (0.9, 0.1, 0.1)
+    here, beside = camera(40, 48), [camera(40, 48, place=(x, 0.0, 0.0)) for x in (-0.2, 0.2)]
+    views = free_cameras.FreeViews(pixels, inverse_depth, here, [here, *beside], inpainter)
+    for view in map(views.view, beside):
+        holes = view.inpainted[8:32, 14:34]
+        assert holes.sum() > 20
+        np.testing.assert_allclose(view.colors[8:32, 14:34][holes], np.tile((0.2, 0.2, 0.8), (holes.sum(), 1)), atol=0.02)
 
 
 def test_what_lies_behind_the_camera_is_not_drawn():

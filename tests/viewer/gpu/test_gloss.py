@@ -30,8 +30,8 @@ def bump() -> np.ndarray:
     return (1 + 1.5 * np.exp(-(((x - 48) / 30) ** 2) - ((y - 36) / 25) ** 2)).astype(np.float32)
 
 
-def maps_of(gloss: Gloss, photo: np.ndarray, disparity: np.ndarray) -> GlossMaps:
-    return make_gloss_maps(gloss.surface, (photo / 255).astype(np.float32), disparity, SceneGeometry(100.0, -1.0))
+def maps_of(gloss: Gloss, photo: np.ndarray, disparity: np.ndarray, infinity: float = -1.0) -> GlossMaps:
+    return make_gloss_maps(gloss.surface, (photo / 255).astype(np.float32), disparity, SceneGeometry(100.0, infinity))
 
 
 def open_flat(renderer: Renderer, gloss: Gloss) -> tuple[np.ndarray, GlossMaps]:
@@ -49,10 +49,11 @@ def shaded(gloss: Gloss, maps: GlossMaps, photo: np.ndarray, eye: ViewOffset) ->
     return np.rint(np.clip(colors, 0, 1) * 255).astype(np.uint8)
 
 
+@pytest.mark.parametrize("infinity", [-1.0, 1.6], ids=["all nearer than infinity", "some beyond infinity"])
 @pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
-def test_the_photo_with_gloss_is_the_cores(renderer: Renderer, gloss: Gloss) -> None:
+def test_the_photo_with_gloss_is_the_cores(renderer: Renderer, gloss: Gloss, infinity: float) -> None:
     photo, disparity = np.full((HEIGHT, WIDTH, 3), 100, np.uint8), bump()
-    maps = maps_of(gloss, photo, disparity)
+    maps = maps_of(gloss, photo, disparity, infinity)
     renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
     renderer.upload_view(1, 1, photo, disparity)
     renderer.set_gloss(maps)
