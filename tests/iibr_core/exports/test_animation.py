@@ -154,6 +154,11 @@ def test_folder(source, tmp_path) -> None:
     assert (disparity.min(), disparity.max()) == (pytest.approx(low), pytest.approx(high))
 
 
+def test_a_stack_beside_the_centre_has_no_disparity_of_another_viewpoint(source, tmp_path) -> None:
+    folder = exported(source, "focal-stack", tmp_path / "stack", {"eye": ViewOffset(0.5, -1.0)}, frames=1)
+    assert {path.name for path in folder.iterdir()} == {"focus_000.png", "all_in_focus.png"}
+
+
 def test_sixteen_bits(source, tmp_path) -> None:
     folder = exported(source, "focal-stack", tmp_path / "stack", frames=2, bits=16)
     for name, optics in focal_stack(source.scene, Optics(), 2).items():

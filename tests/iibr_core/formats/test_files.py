@@ -118,6 +118,8 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path) -> None:
         assert [path.name for path in folder.iterdir()] == [f"{text}.txt"]
     with suppress(ZeroDivisionError), write_folder(folder):
         _ = 1 / 0
+    with pytest.raises(InputError, match="cannot be written"), write_folder(folder) as unfinished:
+        unfinished.rmdir()  # the old folder has made way when the new one cannot take its place
     assert [path.name for path in folder.iterdir()] == ["second.txt"]
     assert list(folder.parent.iterdir()) == [folder]
 

@@ -89,6 +89,17 @@ def test_less_memory_gives_fewer_views(monkeypatch):
         plan_for_viewing(photo, disparity)
 
 
+def test_views_that_are_written_and_forgotten_need_no_memory(monkeypatch):
+    photo, disparity = square_before_wall(300, 800)
+    grid = GridShape(41, 41)
+    monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * scene_bytes(300 * 800, 0))
+    for plan in (lambda *, keeps: plan_for_viewing(photo, disparity, PlanOverrides(grid), keeps),
+                 lambda *, keeps: plan_literal(photo, disparity, grid, keeps)):  # fmt: skip
+        assert plan(keeps=False).grid == grid
+        with pytest.raises(InputError, match="41 x 41 views"):
+            plan(keeps=True)
+
+
 @pytest.mark.parametrize("strength", [float("nan"), float("inf")])
 def test_depth_strength_must_be_finite(strength):
     with pytest.raises(InputError, match="depth strength"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from configparser import ConfigParser
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,23 @@ def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr: Iibr, ph
         assert f"note: {views} views of 96x64 px" in iibr(*words, "web", *grid, "--force").stderr
     assert "--for: not for --to quilt" in refusal_of(iibr(*words, "quilt"))
     assert "'fridge' is not" in refusal_of(iibr(*words[:-2], "fridge", "--to", "web"))
+
+
+@pytest.mark.parametrize("shrink", [1, 2], ids=["a map of the photo's size", "a map of half its size"])
+def test_distances_of_a_map_in_metres_come_out_of_a_field(iibr: Iibr, photo: Path, shrink: int) -> None:
+    """The benchmark's tools compute disparity as focal length * baseline * (1 / distance - 1 / focus distance)."""
+    disparity = np.load("scene_disparity.npy")
+    Path("scene_disparity.npy").unlink()
+    metres = np.where(disparity == disparity.max(), 1.25, 4.0).astype(np.float32)
+    np.save("scene_depth.npy", metres[::shrink, ::shrink])
+    output_of(iibr("export", photo, "--to", "hci", "-o", "field", "--grid", 3))
+    stated = ConfigParser()
+    stated.read("field/parameters.cfg")
+    lens, scene = stated["intrinsics"], stated["extrinsics"]
+    focal_px = lens.getfloat("focal_length_mm") / lens.getfloat("sensor_size_mm") * metres.shape[1]
+    step_m = scene.getfloat("baseline_mm") / 1000
+    nearness = read_pfm(Path("field/gt_disp_lowres.pfm")) / (focal_px * step_m) + 1 / scene.getfloat("focus_distance_m")
+    np.testing.assert_allclose(1 / nearness, metres, rtol=0.01)
 
 
 def test_the_name_with_its_tag_must_not_exist(iibr: Iibr, photo: Path) -> None:

@@ -45,6 +45,14 @@ def test_a_slanted_plane_comes_back_to_fractions_of_a_pixel(slope, offsets, limi
     assert np.quantile(error, 0.95) < limit
 
 
+def test_the_coarse_map_of_a_large_pair_counts_its_own_pixels():
+    views, truth = slanted_views(0.03, PAIR, (200, 400))
+    coarse = estimate_coarse(views, PAIR, 0)
+    assert np.median(np.abs(coarse.values - truth)[16:-16, 16:-16]) < 0.6
+    assert coarse.range_px[0] < np.quantile(truth, 0.02)
+    assert coarse.range_px[1] > np.quantile(truth, 0.98)
+
+
 def test_parts_that_one_view_of_a_pair_hides_are_filled_by_similar_colours():
     """A bright square, 8 px nearer than a dark wall: the wall to its left is hidden in the other view."""
     rng = np.random.default_rng(8)
@@ -95,9 +103,10 @@ def slow_confirmed(maps, offsets, index):
 
 
 def test_maps_confirm_each_other_as_defined():
-    offsets = [ViewOffset(0.0, -2.0), ViewOffset(0.0, 0.0), ViewOffset(1.0, 2.0)]
-    maps = list(np.random.default_rng(1).uniform(-2, 2, (3, 20, 26)).astype(np.float32))
-    for index in range(3):
+    """Of six maps, several may look through a point that one confirms, and several may hide it."""
+    offsets = [ViewOffset(0.0, -2.0), ViewOffset(0.0, 0.0), ViewOffset(1.0, 2.0), *OFFSETS[:3]]
+    maps = list(np.random.default_rng(1).uniform(-2, 2, (6, 20, 26)).astype(np.float32))
+    for index in range(6):
         confirmed = find_confirmed(maps, offsets, index)
         assert 0 < confirmed.mean() < 1
         assert (confirmed == slow_confirmed(maps, offsets, index)).all()
