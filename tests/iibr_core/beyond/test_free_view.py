@@ -89,7 +89,9 @@ def test_holes_show_what_lies_behind_and_never_the_foreground(inpainter):
     for view in map(views.view, beside):
         holes = view.inpainted[8:32, 14:34]
         assert holes.sum() > 20
-        np.testing.assert_allclose(view.colors[8:32, 14:34][holes], np.tile((0.2, 0.2, 0.8), (holes.sum(), 1)), atol=0.02)
+        np.testing.assert_allclose(
+            view.colors[8:32, 14:34][holes], np.tile((0.2, 0.2, 0.8), (holes.sum(), 1)), atol=0.02
+        )
 
 
 def test_what_lies_behind_the_camera_is_not_drawn():

@@ -191,6 +191,16 @@ def test_a_turned_map_is_refined_alike(turn):
         assert (abs(expected - turn(worse)) > 0.05).mean() > 0.02, "something is refined"
 
 
+def test_pixels_that_were_filled_by_colour_follow_the_photo_more_freely():
+    exact, (photo, _) = HEIGHTS[things()], scene()
+    grown, steps = maximum_filter(exact, 3), np.abs(np.diff(exact, axis=1, prepend=exact[:, :1])) > EDGE
+    filled = maximum_filter(steps, 5)
+    wrong, wrong_without = (
+        (abs(found - exact) > EDGE).sum() for found in (refine(photo, grown, filled), refine(photo, grown))
+    )
+    assert wrong < 0.6 * wrong_without
+
+
 def grey_in_one_channel(photo, channel):
     shown = np.full_like(photo, 0.5)
     shown[..., channel] = photo.mean(axis=2)
