@@ -78,14 +78,16 @@ def psnr(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
-    budget, forms = None, []
-    for _ in range(5):
+    budget, forms, parallax = None, [], []
+    while not forms or forms[-1][0] == -1.0:
         page, views = make_page(opened, ExportOptions(budget=budget))
         assert budget is None or len(page) <= budget
         forms.append((-views.form.scale, views.form.every, -views.form.quality))
+        parallax.append(np.array(views.range_px) / views.size.width)
         budget = len(page) - 1
     assert forms[:3] == [(-1.0, 1, -82), (-1.0, 1, -65), (-1.0, 1, -48)]
     assert forms == sorted(forms)
+    np.testing.assert_allclose(parallax, parallax[:1] * len(parallax), err_msg="as much parallax at half the size")
     with pytest.raises(InputError, match="budget"):
         page_of(opened, budget=10_000)
 

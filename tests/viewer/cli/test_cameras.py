@@ -47,6 +47,15 @@ def test_views_that_converge_are_cropped_around_their_principal_points(iibr: Iib
         np.testing.assert_allclose(across * camera.focal_px[0], [1.6 * offset.s, 1.6 * offset.t, 0], atol=1e-6)
         expected = view_of_wall(offset, 1.6)[3:-3, 3:-3]
         assert np.abs(np.asarray(Image.open(path)) / 255 - expected).max() < 0.01
+    if kind == "colmap":
+        points = np.loadtxt("out/sparse/0/points3D.txt", usecols=range(1, 7))
+        middle = cameras[4]
+        x, y, z = middle.world_from_camera.T @ (points[:, :3] - middle.position).T
+        seen = np.asarray(Image.open("out/images/v01_u01.png")).astype(int)
+        column, row = (
+            np.rint(place / z * middle.focal_px[0] + at).astype(int) for place, at in zip((x, y), middle.centre_px)
+        )
+        np.testing.assert_array_equal(seen[row, column], points[:, 3:])
     output_of(iibr("depth", "out", "-o", "found.npy"))
     assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.05), "it opens again as a light field"
 
