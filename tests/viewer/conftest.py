@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import GridShape
 from tests.xvfb import private_display
 from viewer.model import messages
 from viewer.model.action import do
@@ -65,11 +65,7 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Offsc
     from viewer.display.offscreen import OffscreenScene
     from viewer.model.state.preferences import with_sections
 
-    try:
-        viewer = OffscreenScene("egl")
-    except InputError as error:
-        pytest.skip(str(error))
-    with viewer:
+    with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)))
         viewer.do(*(do(messages.dismiss, notice) for notice in viewer.state.notices))
         sections = with_sections((), *(open_sections or ("view", "focus", "aperture", "light")))

@@ -11,7 +11,7 @@ from iibr_core.exports.kinds import ExportOptions, export_kind, export_path
 from iibr_core.exports.source import ExportSource, write_export
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import GridShape
 from tests.viewer.conftest import write_scene
 from viewer.display.offscreen import OffscreenScene
 
@@ -20,10 +20,7 @@ from viewer.display.offscreen import OffscreenScene
 def opened(tmp_path_factory) -> Iterator[ExportSource]:
     source = Source(str(write_scene(tmp_path_factory.mktemp("exports"))), grid=GridShape(3, 3))
     with OffscreenScene() as drawer:
-        try:
-            opened = drawer.open_for_export(source, 1.0, LensChoice(), lambda scene: None)
-        except InputError as error:
-            pytest.skip(str(error))
+        opened = drawer.open_for_export(source, 1.0, LensChoice(), lambda scene: None)
         yield opened
 
 

@@ -13,7 +13,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import MAKING, Scene, Source
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.known_scenes import write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.display.offscreen import OffscreenScene
@@ -24,11 +24,7 @@ from viewer.model.layout import layout_of
 
 @pytest.fixture
 def viewer(photo_path: Path) -> Iterator[OffscreenScene]:
-    try:
-        viewer = OffscreenScene("egl")
-    except InputError as error:
-        pytest.skip(str(error))
-    with viewer:
+    with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(photo_path), grid=GridShape(3, 3)))
         yield viewer
 
