@@ -72,11 +72,12 @@ def test_small_steps_of_a_wheel_add_up_to_a_notch(shown) -> None:
     assert change(-100, 0) == pytest.approx(-notch)
 
 
-def test_a_wheel_over_a_frame_without_focus_scrolls_the_page_around_it(tab, page, tmp_path) -> None:
-    frame = f'<iframe src="{page.as_uri()}" width=400 height=300></iframe><p style="height: 5000px">'
-    (tmp_path / "frame.html").write_text(frame, "utf-8")
+def test_a_wheel_over_a_frame_without_focus_scrolls_the_page_around_it(tab, page, site) -> None:
+    site.pages["/page.html"] = page.read_bytes()
+    site.pages["/frame.html"] = b'<iframe src="/page.html" width=400 height=300></iframe><p style="height: 5000px">'
     tab.resize(480, 640)
-    tab.open((tmp_path / "frame.html").as_uri())
+    tab.open(f"http://127.0.0.1:{site.server_port}/frame.html")
+    tab.wait_until("frames[0].document.documentElement.dataset.state === 'still'")
     tab.call("Input.dispatchMouseEvent", type="mouseWheel", x=200, y=150, deltaX=0, deltaY=120)
     tab.wait_until("scrollY > 0")
 

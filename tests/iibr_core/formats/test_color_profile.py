@@ -170,8 +170,13 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("data", BAD.values(), ids=BAD)
-def test_unusable_profiles_are_refused_and_photos_with_them_count_as_srgb(tmp_path, data):
+LOST = "empty", "cut off in its table", "cut off in its curves", "garbage", "CMYK"
+"""Bad profiles that the library for PNG drops before we can say why."""
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_unusable_profiles_are_refused_and_photos_with_them_count_as_srgb(tmp_path, name):
+    data = BAD[name]
     profile, reason = read_profile(data)
     assert profile is None
     assert reason
@@ -181,4 +186,4 @@ def test_unusable_profiles_are_refused_and_photos_with_them_count_as_srgb(tmp_pa
     photo = read_photo(tmp_path / "a.png")
     assert np.array_equal(np.rint(255 * photo.pixels), COLORS)
     note = f"The colour profile 'made here' {reason} and is ignored: colours are taken as sRGB."
-    assert photo.notes == (note,) or data is not BAD["tables only"]
+    assert photo.notes == (() if name in LOST else (note,))

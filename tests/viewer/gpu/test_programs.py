@@ -21,7 +21,7 @@ INCLUDING = '#version 330 core\n#include "part_a.glsl"\nout vec4 color;\nvoid ma
 @pytest.mark.parametrize("fragment", FRAGMENTS)
 def test_every_shader_compiles_with_every_switch(gl: GLContext, fragment: str) -> None:
     text = flatten(resource_folder("shaders") / fragment).text
-    switches = sorted(set(re.findall(r"#ifdef (\w+)", text)))
+    switches = sorted(set(re.findall(r"(?:^#ifn?def |\bdefined\()(\w+)", text, re.MULTILINE)))
     pairs = [(one, other) for one, other in itertools.combinations(switches, 2)]
     for chosen in ((), *zip(switches), *pairs, tuple(switches)):
         Program(gl.ctx, fragment, chosen).release()
