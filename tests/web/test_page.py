@@ -12,7 +12,7 @@ import pytest
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.browsers.chromium import open_browser
-from tests.iibr_core.unequal_rows import SIZE, SQUARE_PX, write_unequal_rows
+from tests.iibr_core.unequal_rows import SIZE, SQUARE_PX, WALL_PX, write_unequal_rows
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import canvas, export, set_lens, slide, wait_until_still
 from viewer.cli.main import app
@@ -66,6 +66,15 @@ def test_rows_nearer_together_than_columns_are_drawn_as_on_the_desktop(tab, tmp_
             set_lens(tab, 0.5, t, focus, aperture)
             wait_until_still(tab)
             assert psnr(canvas(tab), viewer.picture()) >= LEAST_PSNR_OF_NOISE_DB
+    tab.resize(5 * SIZE, 640)  # the picture lies above the bar
+    # The square reaches from 30 to 70 in the first row's views, from 26 to 66 in the last row's.
+    for t, y, disparity in ((-2, 32, SQUARE_PX), (-2, 73, WALL_PX), (2, 23, WALL_PX), (2, 63, SQUARE_PX)):
+        set_lens(tab, 0, t, 0.0, 1.0)
+        tab.drag((5 * SIZE // 2, (640 - 5 * SIZE) // 2 + 5 * y))
+        assert tab.evaluate("document.getElementById('focus').valueAsNumber") == pytest.approx(disparity, abs=0.5), (
+            t,
+            y,
+        )
 
 
 ONLY_HALVES = """
