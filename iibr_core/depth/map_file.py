@@ -10,7 +10,7 @@ import numpy as np
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_depth
-from iibr_core.formats.images.decode import read_orientation
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import upright
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
 from iibr_core.formats.maps.reader import MapFile, read_map_file
@@ -47,7 +47,7 @@ def depth_from_file(path: Path, photo_path: Path, photo: Photo, choice: DepthCho
     has another shape than the photo and `choice` does not stretch it.
     """
     found = _with_unknown_zeros(read_map_file(path))
-    found = _turned_like_photo(path, found, photo, read_orientation(photo_path))
+    found = _turned_like_photo(path, found, photo, open_picture(photo_path).orientation)
     size, photo_size = image_size(found.values), photo.size
     if has_shape_of(size, photo_size):
         notes = resampling_note(path.name, found.values, photo_size)

@@ -24,7 +24,7 @@ from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map
 from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.sidecar import find_sidecars
 from iibr_core.depth.stereo_pair import estimate_from_pair
-from iibr_core.formats.images.decode import read_orientation
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
@@ -174,7 +174,7 @@ class _Search:
             return None
         photo = photo_in_focus(self.path, self.photo, embedded, self.max_pixels)
         search = replace(self, photo=photo)
-        estimate = rotate_estimate(embedded.estimate, photo.size, read_orientation(self.path))
+        estimate = rotate_estimate(embedded.estimate, photo.size, open_picture(self.path).orientation)
         if embedded.says_near_end:
             origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
             return search.finish(origin, estimate, embedded.notes)

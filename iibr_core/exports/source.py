@@ -144,7 +144,8 @@ class ExportSource:
         self, path: Path, pixels: NDArray[Any], form: PictureFormat = AS_USUAL, color_space: ColorSpace = SRGB
     ) -> None:
         """Write a picture (H, W, 3) of this colour space with the Exif and XMP of the photo."""
-        from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
+        from iibr_core.formats.images.metadata import PictureMetadata
+        from iibr_core.formats.images.open_picture import read_metadata
 
         photo = PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
         write_picture(path, pixels, form, PictureMetadata(photo.exif, photo.xmp), color_space)

@@ -14,7 +14,8 @@ from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.web_streams import can_encode
 from iibr_core.exports.web_views import ViewStore, WebViews, form_that_fits
-from iibr_core.formats.images.metadata import Caption, read_caption
+from iibr_core.formats.images.metadata import Caption, caption_in
+from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.extras import how_to_install
 from iibr_core.runtime.resources import resource_folder
@@ -71,7 +72,7 @@ def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebV
 
 def _words(source: ExportSource, is_credited: bool) -> dict[str, str]:
     """Return the escaped texts of the page by the name of their place."""
-    caption = read_caption(Path(source.scene.source.path)) if source.loaded is not None else Caption()
+    caption = caption_in(read_metadata(Path(source.scene.source.path))) if source.loaded is not None else Caption()
     if not is_credited:
         caption = Caption(description=caption.description)
     title = caption.title or source.scene.name

@@ -96,6 +96,13 @@ def require_file(path: Path) -> None:
         raise InputError(f"{path}: may not be read; change its permissions")
 
 
+def stamp_of(path: Path) -> tuple[int, ...]:
+    """Return a stamp that changes with the file. Raises InputError as `require_file` does."""
+    require_file(path)
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
+
+
 @contextmanager
 def open_binary(path: Path) -> Iterator[BinaryIO]:
     """Open a file to read its bytes. Raises InputError as `require_file` does, and where reading fails."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.colmap import model_in, read_colmap
 from iibr_core.formats.files import printable, read_text, reason_of, stays_within
-from iibr_core.formats.images.decode import read_size
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.formats.pose_limits import MAX_POSES, MAX_POSES_BYTES, NamedCamera, require_count, size_of_pictures
 from iibr_core.types import Camera, ImageSize, InputError
@@ -169,7 +169,7 @@ def _picture_size(name: str, path: Path, source: str) -> ImageSize:
         raise InputError(f"{source}: its picture {printable(name)} does not lie beside the file; state w and h")
     picture = path.parent / name
     try:
-        return read_size(picture if picture.suffix else picture.with_suffix(".png"))
+        return open_picture(picture if picture.suffix else picture.with_suffix(".png")).size
     except (InputError, ValueError) as error:
         raise InputError(f"{source} states no size, and its picture has none: {error}") from error
 

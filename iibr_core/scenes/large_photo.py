@@ -12,6 +12,7 @@ from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.embedded.embedded import photo_in_focus, read_embedded
 from iibr_core.depth.search import find_depth
+from iibr_core.formats.files import stamp_of
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.reader import read_map_size
 from iibr_core.formats.maps.resample import resample_surfaces
@@ -19,7 +20,6 @@ from iibr_core.method.light_field import view_maker
 from iibr_core.method.plan import ScenePlan
 from iibr_core.method.rays import RaySet
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.scenes.photo import stamp_of
 from iibr_core.scenes.scene import LoadedPhoto, Source
 from iibr_core.stages import CLOSED_FORM
 from iibr_core.types import Disparity, FloatImage, InputError, Photo

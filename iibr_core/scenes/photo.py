@@ -15,8 +15,8 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import DepthCanvas
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Levels, Stroke, extent_of, levels_of
 from iibr_core.depth.search import PhotoWithDepth, SlowSource, estimator_of, find_depth, open_with_depth
-from iibr_core.formats.files import require_file
-from iibr_core.formats.images.metadata import settings_text_in
+from iibr_core.formats.files import stamp_of
+from iibr_core.formats.images.open_picture import settings_text_in
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_thumbnail, size_within
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.light_fields.light_field_formats import is_view_file
@@ -34,13 +34,6 @@ SKETCH_WORTH_PIXELS = 1_500_000
 """Number of pixels from which on a photo gets a sketch: smaller ones are read quickly."""
 MAX_SIDE_PX = 16_384
 """Longest side of a photo as it is opened: the limit of most graphics drivers."""
-
-
-def stamp_of(path: Path) -> tuple[int, ...]:
-    """Return a stamp that changes when another file takes the place of this one."""
-    require_file(path)
-    status = path.stat()
-    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks_model: bool = True) -> LoadedPhoto:

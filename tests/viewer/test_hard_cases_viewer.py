@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE
-from iibr_core.formats.images.metadata import settings_text_in
+from iibr_core.formats.images.open_picture import settings_text_in
 from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field

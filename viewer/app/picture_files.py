@@ -44,7 +44,8 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
 
     Return the path. Raises InputError.
     """
-    from iibr_core.formats.images.metadata import SETTINGS_KEY, PictureMetadata, read_metadata
+    from iibr_core.formats.images.metadata import SETTINGS_KEY, PictureMetadata
+    from iibr_core.formats.images.open_picture import read_metadata
     from iibr_core.formats.images.write import write_picture
     from viewer.model.saved_settings import settings_text
 

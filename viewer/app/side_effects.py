@@ -193,7 +193,8 @@ def _open(state: AppState, path: str) -> AppState:
 
 
 def _read_facts(path: str) -> Action:
-    from iibr_core.formats.images.metadata import camera_facts, read_metadata
+    from iibr_core.formats.images.metadata import camera_facts
+    from iibr_core.formats.images.open_picture import read_metadata
 
     return do(set_facts, PhotoFacts(path, camera_facts(read_metadata(Path(path)))))
 

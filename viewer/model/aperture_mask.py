@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import ApertureMask
-from iibr_core.formats.images.decode import decode, read_size
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.types import InputError
 
 MAX_SIDE = 64
@@ -23,10 +23,11 @@ def read_mask(path: Path) -> ApertureMask:
 
     Raises InputError, naming the file, if it is no picture, too large, or black.
     """
-    height, width = read_size(path)
+    mask = open_picture(path)
+    height, width = mask.size
     if height * width > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {width} x {height} is too large for an aperture. Make it smaller, such as 64 x 64.")
-    picture = decode(path)
+    picture = mask.decode()
     grey = _as_share(picture.pixels).mean(axis=2)
     if picture.alpha is not None:
         grey = grey * _as_share(picture.alpha)

@@ -16,7 +16,7 @@ import msgspec
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
-from iibr_core.formats.images.metadata import settings_text_in
+from iibr_core.formats.images.open_picture import settings_text_in
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize

@@ -16,12 +16,12 @@ from iibr_core.depth.embedded.jpeg import HEADER_BYTES, JPEG_START, appended_pic
 from iibr_core.depth.embedded.trailers import huawei_estimate, samsung_estimate, second_picture_estimate, thumbnail_of
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.files import open_binary
-from iibr_core.formats.images.avif import avif_depth_file, is_avif
-from iibr_core.formats.images.decode import read_orientation
-from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, is_heic, read_heic_depth
+from iibr_core.formats.images.avif import avif_depth_file
+from iibr_core.formats.images.file_kinds import Kind
+from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, read_heic_depth
 from iibr_core.formats.images.jpeg_xl import has_depth_channel
-from iibr_core.formats.images.lfp import is_lfp, read_lfp_depth
-from iibr_core.formats.images.metadata import read_metadata
+from iibr_core.formats.images.lfp import read_lfp_depth
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture import upright
 from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, read_lif
@@ -69,9 +69,8 @@ class EmbeddedDepth:
 def read_embedded(path: Path) -> EmbeddedDepth | None:
     """Return the depth within a photo's file, None if it holds none. Raises InputError if it is damaged."""
     try:
-        for is_kind, read in ((is_avif, _in_avif), (is_heic, _in_heic), (is_lfp, _in_lfp)):
-            if is_kind(path):
-                return read(path) or _in_packet(path)
+        if (read := READERS.get(open_picture(path).kind)) is not None:
+            return read(path) or _in_packet(path)
         data = _jpeg_bytes(path)
         return embedded_in_jpeg(data) if data else _in_packet(path)
     except InputError as error:
@@ -131,7 +130,7 @@ def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels
     if embedded.all_in_focus is None:
         return photo
     try:
-        sharp = _read_sharp(embedded.all_in_focus, read_orientation(path), max_pixels)
+        sharp = _read_sharp(embedded.all_in_focus, open_picture(path).orientation, max_pixels)
         if not has_shape_of(sharp.size, photo.size):
             raise InputError("the sharp one has another shape.")
     except InputError as error:
@@ -150,7 +149,7 @@ def _read_sharp(data: bytes, orientation: int, max_pixels: int) -> Photo:
         path.write_bytes(data)
         try:
             sharp = read_photo(path, max_pixels, keeps_primaries=True)
-            is_turned = read_orientation(path) != 1
+            is_turned = open_picture(path).orientation != 1
         except InputError as error:
             raise InputError(f"the all-in-focus picture: {str(error).removeprefix(f'{path}: ')}") from error
     return sharp if is_turned else replace(sharp, pixels=upright(sharp.pixels, orientation))
@@ -176,7 +175,7 @@ def unread_parts(path: Path) -> tuple[str, ...]:
 
     It is meant for photos without known depth, so that a guess is explained. Raises InputError if the file is missing.
     """
-    in_heic = " ".join(heic_auxiliaries(path)).encode() if is_heic(path) else b""
+    in_heic = " ".join(heic_auxiliaries(path)).encode() if open_picture(path).kind == "HEIC" else b""
     parts = _mattes(in_heic) + _unread_in_jpeg(_jpeg_bytes(path))
     if has_depth_channel(path):
         parts.append(f"a depth channel (save it, for example with djxl, as {path.stem}_depth.png)")
@@ -203,10 +202,10 @@ def _mattes(data: bytes) -> list[str]:
 
 def _jpeg_bytes(path: Path) -> bytes:
     """Return a whole JPEG file, b"" for other and very large files. Raises InputError if it is missing."""
+    if open_picture(path).kind != "JPEG" or path.stat().st_size > MAX_FILE_BYTES:
+        return b""
     with open_binary(path) as file:
-        is_jpeg = file.read(3) == JPEG_START and path.stat().st_size <= MAX_FILE_BYTES
-        file.seek(0)
-        return file.read() if is_jpeg else b""
+        return file.read()
 
 
 def _in_avif(path: Path) -> EmbeddedDepth | None:
@@ -235,9 +234,13 @@ def _in_lfp(path: Path) -> EmbeddedDepth | None:
 
 def _in_packet(path: Path) -> EmbeddedDepth | None:
     """Return the depth in the XMP of any other kind of picture, as GDepth."""
-    packet = read_metadata(path).xmp
+    packet = open_picture(path).metadata.xmp
     if b"/1.0/depthmap/" not in packet:
         return None
     xmp = parse_packet(packet)
     estimate = gdepth_estimate(xmp)
     return None if estimate is None else EmbeddedDepth(estimate, GDEPTH, all_in_focus(xmp), range_notes(xmp))
+
+
+READERS: dict[Kind, Callable[[Path], EmbeddedDepth | None]] = {"AVIF": _in_avif, "HEIC": _in_heic, "Lytro": _in_lfp}
+"""Functions that return the depth within a kind of files, None without."""

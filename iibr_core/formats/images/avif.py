@@ -11,17 +11,8 @@ from iibr_core.formats.files import PARSE_ERRORS, open_binary, require_file
 from iibr_core.formats.images.iso_boxes import associations, boxes, meta_boxes, with_primary
 from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow
 
-BRANDS = frozenset({b"avif", b"avis"})
 DEPTH_TYPES = (b"urn:mpeg:mpegB:cicp:systems:auxiliary:depth", b"urn:mpeg:hevc:2015:auxid:2")
 """Types of auxiliary pictures that are depth maps, as AVIF has them and as HEIC."""
-
-
-def is_avif(path: Path) -> bool:
-    """Return whether a file begins as AVIF files do, whatever its name."""
-    with open_binary(path) as file:
-        start = file.read(256)
-    size = int.from_bytes(start[:4], "big")
-    return start[4:8] == b"ftyp" and not BRANDS.isdisjoint(start[k : k + 4] for k in range(8, min(size, len(start)), 4))
 
 
 @contextmanager

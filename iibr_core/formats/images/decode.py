@@ -14,10 +14,8 @@ from PIL.Image import Image
 
 from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import decoding_fault, require_file
-from iibr_core.formats.images.avif import is_avif, open_avif
-from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
-from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
-from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
+from iibr_core.formats.images.avif import open_avif
+from iibr_core.formats.images.file_kinds import unreadable_kind
 from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
 from iibr_core.formats.images.pillow_reader import open_with_pillow, orientation_in, picture_of
 from iibr_core.formats.images.stereo_jpeg import lif_bytes, open_lif
@@ -58,62 +56,52 @@ class _Stored(NamedTuple):
     dtype: str
 
 
-def decode(path: Path, number: int = 0) -> Picture:
-    """Read a picture as its file stores it: without conversion of its colours, and not turned by its orientation.
+class Header(NamedTuple):
+    """Header of a picture. size: as stored. orientation: Exif's, 1 to 8. spec: OpenImageIO's record, None without."""
 
-    Palettes and CMYK become RGB. number: the picture within the file; 0 is the one that every program shows.
-    """
-    if is_heic(path):
-        return read_heic(path, number)
-    if is_lfp(path):
-        return read_lfp(path)
-    if number or is_avif(path):
-        with _open_with_pillow(path, number) as image:
-            return picture_of(image)
-    return _decode_with_oiio(path)
+    size: ImageSize
+    orientation: int = 1
+    spec: Any = None
+
+    def text(self, name: str) -> str:
+        """Return a text; "" where it is missing or damaged, and for files that OpenImageIO does not read."""
+        return "" if self.spec is None else text_attribute(self.spec, name)
 
 
-def decode_bands(path: Path) -> Iterator[Picture]:
-    """Yield the first picture of a file from top to bottom, some rows at a time where that saves memory.
-
-    Files with alpha or linear light, and those that OpenImageIO does not read, come as one.
-    """
-    if not (is_avif(path) or is_heic(path) or is_lfp(path)):
-        source = _open(path)
-        spec, stored = source.spec(), _stored(path, source.spec())
-        if stored.alpha_at < 0 and stored.dtype in ("uint8", "uint16"):
-            facts = _facts(spec)
-            yield from (Picture(rows, **facts) for rows in _read_rows(path, source, stored))
-            return
-    yield decode(path)
+def oiio_header(path: Path, number: int) -> Header:
+    """Return the header of a picture that OpenImageIO reads; Pillow reads further ones of a file."""
+    if number:
+        return pillow_header(path, number)
+    spec = oiio.ImageSpec(_open(path).spec())  # a copy: its own does not outlive the open file
+    return Header(ImageSize(spec.height, spec.width), int(spec.get_int_attribute("Orientation", 1)), spec)
 
 
-def read_size(path: Path, number: int = 0) -> ImageSize:
-    """Return the size of a picture as stored, from the file's header."""
-    if is_heic(path):
-        return heic_size(path, number)
-    if is_lfp(path):
-        return lfp_size(path)
-    if number or is_avif(path):
-        with _open_with_pillow(path, number) as image:
-            return ImageSize(image.height, image.width)
-    spec = _open(path).spec()
-    return ImageSize(spec.height, spec.width)
+def pillow_header(path: Path, number: int) -> Header:
+    """Return the header of an AVIF, or of a further picture in a file."""
+    with _open_with_pillow(path, number) as image:
+        return Header(ImageSize(image.height, image.width), orientation_in(image.getexif()))
 
 
-def read_orientation(path: Path) -> int:
-    """Return Exif's Orientation, 1 to 8; 1 for HEIC, which is decoded upright, and for files that cannot be read."""
-    if path.is_file() and is_avif(path):
-        with open_avif(path) as image:
-            return orientation_in(image.getexif())
-    header = open_header(path)
-    return 1 if header is None else int(header.spec().get_int_attribute("Orientation", 1))
+def decode_avif(path: Path, number: int) -> Picture:
+    """Decode an AVIF, or a further picture in a file."""
+    with _open_with_pillow(path, number) as image:
+        return picture_of(image)
 
 
-def read_text(path: Path, name: str) -> str:
-    """Return a text of a picture's header; "" where it is missing or damaged, and for files OpenImageIO cannot read."""
-    header = open_header(path)
-    return "" if header is None else text_attribute(header.spec(), name)
+def decode_other(path: Path, number: int) -> Picture:
+    """Decode a picture of any kind that OpenImageIO reads, or a further picture in a file."""
+    return decode_avif(path, number) if number else _decode_with_oiio(path)
+
+
+def oiio_bands(path: Path) -> Iterator[Picture]:
+    """Yield a picture from top to bottom, some rows at a time unless it has alpha or linear light."""
+    source = _open(path)
+    spec, stored = source.spec(), _stored(path, source.spec())
+    if stored.alpha_at < 0 and stored.dtype in ("uint8", "uint16"):
+        facts = _facts(spec)
+        yield from (Picture(rows, **facts) for rows in _read_rows(path, source, stored))
+    else:
+        yield _decode_with_oiio(path)
 
 
 def open_header(path: Path) -> Any | None:
@@ -244,11 +232,11 @@ def _facts(spec: Any) -> dict[str, Any]:
 def _open(path: Path) -> Any:
     """Open a picture and check its header."""
     require_file(path)
-    if (raw := raw_kind(path)) is not None:
-        raise InputError(f"{path}: is {raw.name}; {raw.way_out}")
-    hints = oiio.ImageSpec()
-    hints.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(oiio_name(path), hints)
+    source = oiio.ImageInput.open(oiio_name(path))
+    if source is not None and (source.format_name() == "tiff" or source.spec().nchannels not in (1, 3)):
+        hints = oiio.ImageSpec()
+        hints.attribute("oiio:UnassociatedAlpha", 1)
+        source = oiio.ImageInput.open(oiio_name(path), hints)
     if source is None:
         complaint = complaint_of(oiio)
         if (kind := unreadable_kind(path)) is not None:

@@ -1,8 +1,9 @@
-"""Kinds of files that are mistaken for pictures, with advice on what to do instead."""
+"""Kinds of files by their first bytes: pictures, and what is mistaken for them, with advice on what to do instead."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from iibr_core.formats.files import open_binary
 
@@ -16,6 +17,9 @@ RAW_STARTS = re.compile(
     rb"II\*\0.{4}CR|II\x1a\0.{4}HEAPCCDR|FUJIFILMCCD-RAW|FOVb|\0MRM|IIU\0|IIR[OS]\x08?|MMOR|.{4}ftypcrx ", re.DOTALL
 )
 TIFF_STARTS = (b"II*\0", b"MM\0*")
+AVIF_BRANDS = frozenset({b"avif", b"avis"})
+Kind = Literal["HEIC", "AVIF", "Lytro", "RAW", "JPEG", "other"]
+"""Kinds of pictures that are read in different ways. Lytro: its raw files, too."""
 
 
 class FileKind(NamedTuple):
@@ -50,30 +54,51 @@ KINDS: tuple[tuple[bytes, FileKind], ...] = (
 TEXT = FileKind("a text file, not a picture", "get the picture itself")
 
 
-def raw_kind(path: Path) -> FileKind | None:
-    """Return the kind of a camera's RAW file; None for other files. Raises InputError where it cannot be read.
+def _begins(pattern: bytes) -> Callable[[bytes, str], bool]:
+    compiled = re.compile(pattern, re.DOTALL)
+    return lambda start, ending: compiled.match(start) is not None
+
+
+def _is_avif(start: bytes, ending: str) -> bool:
+    """Return whether one of the brands in the first box is AVIF's."""
+    size = int.from_bytes(start[:4], "big")
+    return start[4:8] == b"ftyp" and not AVIF_BRANDS.isdisjoint(start[k : k + 4] for k in range(8, min(size, 256), 4))
+
+
+def _is_raw(start: bytes, ending: str) -> bool:
+    """Return whether a file is a camera's RAW file.
 
     Most begin as TIFF does, and hold a small preview that other programs take for the picture.
     """
-    start = _start(path)
-    is_raw = RAW_STARTS.match(start) or (RAW_ENDING.fullmatch(path.suffix) and start.startswith(TIFF_STARTS))
-    return RAW if is_raw else None
+    is_named = RAW_ENDING.fullmatch(ending) is not None and start.startswith(TIFF_STARTS)
+    return is_named or RAW_STARTS.match(start) is not None
+
+
+SNIFFERS: tuple[tuple[Kind, Callable[[bytes, str], bool]], ...] = (
+    ("HEIC", _begins(rb".{4}ftyp(?:hei[cxms]|hev[cx]|mif1|msf1)")),
+    ("Lytro", _begins(rb"\x89LFP\r\n\x1a\n")),
+    ("AVIF", _is_avif),
+    ("RAW", _is_raw),
+    ("JPEG", _begins(rb"\xff\xd8\xff")),
+)
+"""Kinds and their tests by the first bytes and the ending of the name. The first that fits counts."""
+
+
+def kind_of(start: bytes, ending: str) -> Kind:
+    """Return the kind of a picture. start: its first START_BYTES. ending: of its name, with the dot."""
+    return next((kind for kind, is_kind in SNIFFERS if is_kind(start, ending)), "other")
 
 
 def unreadable_kind(path: Path) -> FileKind | None:
-    """Return the kind of a file that no reader took; None for an unknown one. Raises InputError as `raw_kind` does."""
-    start = _start(path).removeprefix(BYTE_ORDER_MARK)
+    """Return the kind of a file that no reader took; None for an unknown one."""
+    with open_binary(path) as file:
+        start = file.read(START_BYTES).removeprefix(BYTE_ORDER_MARK)
     for pattern, kind in KINDS:
         if re.match(pattern, start, re.DOTALL):
             return kind
     if RAW_ENDING.fullmatch(path.suffix):
         return RAW
     return TEXT if _is_text(start) else None
-
-
-def _start(path: Path) -> bytes:
-    with open_binary(path) as file:
-        return file.read(START_BYTES)
 
 
 def _is_text(start: bytes) -> bool:

@@ -1,12 +1,8 @@
 """Notes for people about stereo pairs, panoramas and animations, of which one flat picture is shown."""
 
-from contextlib import suppress
 from pathlib import Path
 
-from PIL import Image
-
-from iibr_core.formats.images.metadata import read_metadata
-from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
+from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.images.side_by_side import stated_pair
 from iibr_core.formats.images.xmp import parse_packet, value_in
 from iibr_core.types import InputError
@@ -14,7 +10,6 @@ from iibr_core.types import InputError
 GPANO = "http://ns.google.com/photos/1.0/panorama/"
 GIMAGE = "http://ns.google.com/photos/1.0/image/"
 GDEPTH = "http://ns.google.com/photos/1.0/depthmap/"
-ANIMATED_FORMATS = ("GIF", "PNG", "WEBP", "AVIF")
 
 
 def file_notes(path: Path) -> tuple[str, ...]:
@@ -23,12 +18,13 @@ def file_notes(path: Path) -> tuple[str, ...]:
     A damaged header gives no notes.
     """
     _, note = stated_pair(path)
-    return (*((note,) if note else ()), *_panorama_notes(path), *_animation_notes(path))
+    metadata = read_metadata(path)
+    animation = f"Animation: the first of its {metadata.pictures} pictures is used." if metadata.pictures > 1 else ""
+    return (*filter(None, [note]), *_panorama_notes(metadata.xmp), *filter(None, [animation]))
 
 
-def _panorama_notes(path: Path) -> tuple[str, ...]:
+def _panorama_notes(xmp: bytes) -> tuple[str, ...]:
     """Return notes from XMP as Google's cameras write it for panoramas and photos with a right eye's picture."""
-    xmp = read_metadata(path).xmp
     if GPANO.encode() not in xmp and GIMAGE.encode() not in xmp:
         return ()
     try:
@@ -44,10 +40,3 @@ def _panorama_notes(path: Path) -> tuple[str, ...]:
     if value_in(tree, GIMAGE, "Mime") is not None and GDEPTH.encode() not in xmp:
         notes += ("The right eye's picture in it (Cardboard Camera, VR180) is not used.",)
     return notes
-
-
-def _animation_notes(path: Path) -> tuple[str, ...]:
-    count = 1
-    with suppress(*DECODE_ERRORS), Image.open(path, formats=ANIMATED_FORMATS) as image:
-        count = getattr(image, "n_frames", 1)
-    return (f"Animation: the first of its {count} pictures is used.",) if count > 1 else ()

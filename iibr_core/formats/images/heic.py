@@ -13,16 +13,8 @@ from iibr_core.formats.images.picture import Picture, opaque_as_none, require_so
 from iibr_core.formats.images.pillow_reader import damage_as_input_error, exif_of, facts_of, orientation_in
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
-BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
 GROUP_HEADER_BYTES = 12
 """Size of a group's version, number and count, which precede the numbers of its items."""
-
-
-def is_heic(path: Path) -> bool:
-    """Return whether a file begins as HEIF files do, whatever its name."""
-    with open_binary(path) as file:
-        start = file.read(12)
-    return start[4:8] == b"ftyp" and start[8:12] in BRANDS
 
 
 def read_heic(path: Path, number: int = 0) -> Picture:

@@ -54,18 +54,12 @@ class Lfp:
     depth: FloatImage | None
 
 
-def is_lfp(path: Path) -> bool:
-    """Return whether a file begins as Lytro's do, raw or processed."""
-    with open_binary(path) as file:
-        return file.read(len(LFP_START)) == LFP_START
-
-
 def open_lfp(path: Path) -> Lfp | None:
     """Return the contents of a processed Lytro file; None for raw ones and other files."""
-    if not is_lfp(path):
-        return None
     with open_binary(path) as file:
-        data = file.read(MAX_FILE_BYTES)
+        if file.read(len(LFP_START)) != LFP_START:
+            return None
+        data = LFP_START + file.read(MAX_FILE_BYTES)
     text, chunks, end = _sections(data)
     if end > len(data):
         raise InputError(f"{path}: cut off at {len(data):,} of {end:,} bytes or more; get the whole file again")

@@ -13,10 +13,10 @@ from typing import Any
 
 from PIL import Image
 
-from iibr_core.formats.images.decode import read_size, read_text
-from iibr_core.formats.images.heic import heic_info, is_heic
+from iibr_core.formats.images.file_kinds import Kind
+from iibr_core.formats.images.heic import heic_info
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, EXIF_FOLDER, ORIENTATION_TAG, exif_of
-from iibr_core.formats.images.xmp import NAMESPACES, list_value_in, parse_packet, text_in, unpack
+from iibr_core.formats.images.xmp import NAMESPACES, list_value_in, parse_packet
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
 
 GPS_FOLDER = 0x8825
@@ -37,6 +37,7 @@ UNCALIBRATED = 0xFFFF
 MAX_EXIF_BYTES = 65_000
 """Largest Exif that a JPEG holds."""
 MAX_CAPTION_CHARACTERS, MAX_FACT_CHARACTERS = 2000, 60
+ANIMATED_FORMATS = ("GIF", "PNG", "WEBP", "AVIF")
 SETTINGS_KEY = "iibr:settings"
 """Name of the text that holds the settings of this program in a saved picture."""
 
@@ -48,12 +49,14 @@ Tags = dict[int, Any]
 class PictureMetadata:
     """Metadata of a picture.
 
-    exif: in the form of JPEG files, b"" without. xmp: a packet, b"" without. texts: of this program, by name.
+    exif: in the form of JPEG files, b"" without. xmp: a packet, b"" without. texts: of this program, by name. pictures:
+    number of those of an animation, 1 for others.
     """
 
     exif: bytes = b""
     xmp: bytes = b""
     texts: Mapping[str, str] = field(default_factory=dict)
+    pictures: int = 1
 
 
 @dataclass(frozen=True)
@@ -66,17 +69,18 @@ class Caption:
     rights: str = ""
 
 
-def read_metadata(path: Path) -> PictureMetadata:
-    """Return Exif and XMP of a photo's file; nothing where the file is damaged or missing."""
+def metadata_in(path: Path, kind: Kind) -> PictureMetadata:
+    """Return the metadata of a file; nothing where it is damaged."""
     try:
-        if is_heic(path):
+        if kind == "HEIC":
             info = heic_info(path)
             return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))
         with Image.open(path) as image:
             exif = _bytes_of(image.info.get("exif"))
             if not exif and (stored := image.getexif()):  # a TIFF keeps it in its first folder
                 exif = _exif_from(*_folders_of(stored)).tobytes()
-            return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
+            pictures = getattr(image, "n_frames", 1) if image.format in ANIMATED_FORMATS else 1
+            return PictureMetadata(exif, _bytes_of(image.info.get("xmp")), pictures=pictures)
     except DECODE_ERRORS:
         return PictureMetadata()
 
@@ -95,21 +99,8 @@ def exif_for(exif: bytes, size: ImageSize, color_space: ColorSpace, keeps_positi
         return Image.Exif()
 
 
-def settings_text_in(path: Path) -> str:
-    """Return the text of the settings that a picture was saved with; "" without.
-
-    Raises InputError where the file is no picture, or its settings are damaged.
-    """
-    read_size(path)
-    try:
-        return unpack(read_text(path, SETTINGS_KEY) or text_in(read_metadata(path).xmp, SETTINGS_KEY))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-
-
-def read_caption(path: Path) -> Caption:
-    """Return the texts about a photo, XMP before Exif; empty where the file is damaged or missing."""
-    metadata = read_metadata(path)
+def caption_in(metadata: PictureMetadata) -> Caption:
+    """Return the texts about a photo, XMP before Exif; empty where they are damaged or missing."""
     photo = _folders_in(metadata.exif)[0]
     texts = [photo.get(tag) for tag in (0, DESCRIPTION, ARTIST, COPYRIGHT)]
     with suppress(InputError):

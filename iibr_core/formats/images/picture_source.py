@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.color import bytes_from_encoded
-from iibr_core.formats.images.decode import decode, read_orientation, read_size
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.types import ImageSize, InputError, image_size
@@ -52,18 +52,12 @@ def source_size(source: PictureSource) -> ImageSize:
     """Return the size from the file's header: of a part as shown, of a whole picture as stored, not upright."""
     if source.shown_size is not None:
         return source.shown_size
-    return read_size(source.path, source.number) if source.part is None else source.part.size
-
-
-def upright_size(path: Path) -> ImageSize:
-    """Return the size of a file's picture from its header, turned by its orientation."""
-    size = read_size(path)
-    return ImageSize(size.width, size.height) if read_orientation(path) >= 5 else size
+    return open_picture(source.path).size_of(source.number) if source.part is None else source.part.size
 
 
 def read_source(source: PictureSource) -> Picture:
     """Decode a picture: a part of it upright, a whole one as stored."""
-    picture = decode(source.path, source.number)
+    picture = open_picture(source.path).decode(source.number)
     return picture if source == source.whole else part_of(picture, source)
 
 
@@ -111,7 +105,7 @@ def small_picture(path: Path, within: ImageSize, is_smoothed: bool = False) -> N
         picture.draft("RGB", (2 * max(within), 2 * max(within)))
         if picture.mode.startswith(DEEP_MODES):
             return None
-        orientation = read_orientation(path)
+        orientation = open_picture(path).orientation
         box = ImageSize(within.width, within.height) if orientation >= 5 else within
         # Palettes cannot be averaged.
         whole = picture.convert("RGB") if is_smoothed and picture.mode != "RGB" else picture
@@ -124,7 +118,7 @@ def small_decoded_picture(path: Path, longest_px: int) -> NDArray[np.uint8]:
     within = ImageSize(longest_px, longest_px)
     if (small := small_picture(path, within, is_smoothed=True)) is not None:
         return small
-    whole = decode(path)
+    whole = open_picture(path).decode()
     step = max(max(whole.size) // (4 * longest_px), 1)
     colors = whole.pixels[::step, ::step].astype(np.float32) / np.float32(full_scale(whole.pixels.dtype))
     encoded = bytes_from_encoded(np.nan_to_num(colors))

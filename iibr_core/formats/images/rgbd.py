@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import COPY, require_file
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, small_picture, upright_size
+from iibr_core.formats.files import COPY, stamp_of
+from iibr_core.formats.images.open_picture import open_picture
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, small_picture
 from iibr_core.types import ImageSize
 
 TAG = re.compile(rf"(?:[_.-]|^)rgbd{COPY}$", re.IGNORECASE)
@@ -32,13 +33,12 @@ def rgbd_parts(path: Path) -> tuple[PictureSource, PictureSource] | None:
     One half must be grey and the other one coloured. The file's name must state the pair, or its sides differ by a
     factor of about 2.
     """
-    require_file(path)
-    return _parts(path, path.stat().st_mtime_ns)
+    return _parts(path, stamp_of(path))
 
 
 @lru_cache(maxsize=64)
-def _parts(path: Path, modified_ns: int) -> tuple[PictureSource, PictureSource] | None:
-    size, is_named = upright_size(path), TAG.search(path.stem) is not None
+def _parts(path: Path, stamp: tuple[int, ...]) -> tuple[PictureSource, PictureSource] | None:
+    size, is_named = open_picture(path).upright_size, TAG.search(path.stem) is not None
     if min(size) < 2 or not (is_named or max(size) >= MIN_ASPECT * min(size)):
         return None
     pixels = small_picture(path, COMPARED)

@@ -10,17 +10,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO, Literal
 
-from iibr_core.formats.files import COPY, open_binary, require_file
+from iibr_core.formats.files import COPY, open_binary, stamp_of
 from iibr_core.formats.images.alike_halves import is_one_scene
-from iibr_core.formats.images.file_kinds import raw_kind
 from iibr_core.formats.images.lfp import open_lfp
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import (
     PicturePart,
     PictureSource,
     cut_part,
     small_decoded_picture,
     source_size,
-    upright_size,
 )
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.types import ImageSize, InputError, image_size
@@ -45,7 +44,7 @@ RIGHT_FIRST = re.compile(r"rl[bpq]?\b|right-?left|cross|bt\b|bottom-?top", re.IG
 SQUASHED = re.compile(r"(lrq|rlq|abq)\b", re.IGNORECASE)
 STEREO_ENDINGS = (".jps", ".pns")
 """Endings of JPEG and PNG files of two pictures side by side, the right eye's first."""
-JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
+START_OF_SCAN = 0xDA
 APP3, IDENTIFIER = 0xE3, b"_JPSJPS_"
 DESCRIPTOR_AT = 10
 """First byte of the descriptor: one byte each for separation, flags, layout and type."""
@@ -96,16 +95,15 @@ def stated_pair(path: Path) -> tuple[Eyes | None, str]:
 
     They are None where a file states no pair, with "" as note, and where its halves differ and it may be one picture.
     """
-    require_file(path)
-    return _stated_pair(path, path.stat().st_mtime_ns)
+    return _stated_pair(path, stamp_of(path))
 
 
 @lru_cache(maxsize=64)
-def _stated_pair(path: Path, modified_ns: int) -> tuple[Eyes | None, str]:
+def _stated_pair(path: Path, stamp: tuple[int, ...]) -> tuple[Eyes | None, str]:
     layout = stated_layout(path)
     if layout is None:
         return None, ""
-    size = upright_size(path)
+    size = open_picture(path).upright_size
     parts, shown = layout.eyes(size)
     if min(parts[0].size) < 1 and layout.is_plain:
         raise InputError(f"{path}: {size} pixels cannot be split between two eyes; is its name right?")
@@ -157,6 +155,8 @@ def stated_layout(path: Path) -> PairLayout | None:
 
 def _jps_layout(path: Path, is_stereo_file: bool) -> PairLayout | None:
     """Return the arrangement by a JPEG's descriptor; None for other files, and for anaglyphs."""
+    if open_picture(path).kind != "JPEG":
+        return None
     with open_binary(path) as file:
         descriptor = next((content for content in _app3_segments(file) if content.startswith(IDENTIFIER)), b"")
     _, flags, layout, kind = descriptor[DESCRIPTOR_AT : DESCRIPTOR_AT + 4].ljust(4, b"\0")
@@ -168,9 +168,8 @@ def _jps_layout(path: Path, is_stereo_file: bool) -> PairLayout | None:
 
 
 def _app3_segments(file: BinaryIO) -> Iterator[bytes]:
-    """Yield the content of each such segment before the first scan; none where the file is no JPEG."""
-    if file.read(2) != JPEG_START:
-        return
+    """Yield the content of each such segment of a JPEG before the first scan."""
+    file.seek(2)
     while len(mark := file.read(4)) == 4 and mark[0] == 0xFF and mark[1] != START_OF_SCAN:
         content = file.read(max(int.from_bytes(mark[2:], "big") - 2, 0))
         if mark[1] == APP3:
@@ -189,7 +188,7 @@ def left_picture(path: Path) -> PictureSource:
 
 def refuse_raw_light_field(path: Path) -> None:
     """Raise InputError for raw files of light-field cameras, which are mosaics of microlens images."""
-    if path.suffix.lower() in LIGHT_FIELD_ENDINGS and raw_kind(path) is None and open_lfp(path) is None:
+    if path.suffix.lower() in LIGHT_FIELD_ENDINGS and open_picture(path).kind != "RAW" and open_lfp(path) is None:
         raise InputError(
             f"{path}: is a raw light field (Lytro), which must be decoded first: PlenoptiCam or the Light Field Toolbox"
             " make views of it, and their folder opens here"

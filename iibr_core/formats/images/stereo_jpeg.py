@@ -15,7 +15,6 @@ from iibr_core.formats.files import PARSE_ERRORS, open_binary, printable
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import InputError
 
-JPEG_START = b"\xff\xd8\xff"
 ENTRIES_TAG = 0xB002
 MPO_ENDING = ".mpo"
 """Ending of files whose pictures are for two eyes, even where the camera does not state their purpose."""
@@ -130,12 +129,6 @@ def _view(entry: Mapping[str, Any]) -> LifView:
         position = position.get("x", 0.0)
     x = position[0] if isinstance(position, list) else position
     return LifView(int(entry["image"]["blob_id"]), inverse_depth and int(inverse_depth["blob_id"]), float(x))
-
-
-def is_jpeg(path: Path) -> bool:
-    """Return whether a file begins as JPEGs do."""
-    with open_binary(path) as file:
-        return file.read(len(JPEG_START)) == JPEG_START
 
 
 def is_stereo_mpo(path: Path) -> bool:

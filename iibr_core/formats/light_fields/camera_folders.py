@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import printable, stays_within
-from iibr_core.formats.images.decode import read_size
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
     GridIndex,
@@ -101,7 +101,7 @@ def _field_of(
 
     One view step is that of columns, of one column that of rows.
     """
-    cameras = [camera.resized(read_size(picture)) for camera, picture in zip(cameras, pictures)]
+    cameras = [camera.resized(open_picture(picture).size) for camera, picture in zip(cameras, pictures)]
     central = cameras[central_camera(cameras)]
     if len(cameras) < 2 or not all(_looks_alike(camera, central) for camera in cameras):
         return None
@@ -175,7 +175,7 @@ def _free_scene(folder: Path, pictures: Sequence[Path], cameras: Sequence[Camera
         KnownView(picture.stem, ViewOffset(*map(float, camera.position[1::-1])), PictureSource(picture), camera)
         for picture, camera in zip(pictures, cameras)
     )
-    focal_px = cameras[central].resized(read_size(pictures[central])).focal_px[0]
+    focal_px = cameras[central].resized(open_picture(pictures[central]).size).focal_px[0]
     near, far = cameras[central].depth_range or (1.0, 1.0)
     note = (
         f"Cameras stand up to {stray:.1f} view steps before or behind the plane of the given one, and are turned"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.images.decode import read_size
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
     KnownDisparity,
@@ -114,7 +114,7 @@ def read_middlebury(folder: Path) -> MultiView | None:
 
 def _coded_maps(folder: Path, kind: str, picture: Path) -> dict[int, KnownDisparity]:
     """Return maps of integers: disparity between the two views of TRUTH_AT, times a factor that depends on the size."""
-    maps, width = maps_in(folder), read_size(picture).width
+    maps, width = maps_in(folder), open_picture(picture).size.width
     is_of_2001 = picture.suffix.lower() == ".ppm" and kind == "im" and width < MAX_WIDTH_2001
     factor = SCALE_2001 if is_of_2001 else float(max(round(FULL_WIDTH[kind] / width), 1))
     known: dict[int, KnownDisparity] = {}

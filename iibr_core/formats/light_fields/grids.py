@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from iibr_core.formats.files import entries_of, read_text, reason_of
-from iibr_core.formats.images.decode import read_size
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
     PICTURE_EXTENSIONS,
@@ -191,7 +191,7 @@ def _grid_scene(
         KnownView(f"v{v:02d} u{u:02d}", ViewOffset(float(v), float(u)), PictureSource(path), place=(v, u))
         for (v, u), (_, path) in zip(places, pictures)
     )
-    focal_px = stated_focal_px(parameters, read_size(views[0].path)) if parameters else None
+    focal_px = stated_focal_px(parameters, open_picture(views[0].path).size) if parameters else None
     whole = folder.resolve()
     low, high = (parameters.get(name, math.nan) for name in ("disp_min", "disp_max"))
     return MultiView(

@@ -4,11 +4,11 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from iibr_core.formats.images.decode import read_size, read_text
-from iibr_core.formats.images.heic import heic_pair, is_heic
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size, upright_size
+from iibr_core.formats.images.heic import heic_pair
+from iibr_core.formats.images.open_picture import open_picture
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
 from iibr_core.formats.images.side_by_side import refuse_raw_light_field, stated_pair
-from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, is_jpeg, is_stereo_mpo, open_lif
+from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, is_stereo_mpo, open_lif
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
 from iibr_core.formats.maps.disparity_file import has_shape_of
@@ -56,8 +56,8 @@ def read_lenslet_image(path: Path) -> MultiView | None:
     """
     if not LENSLET_TAG.search(path.stem):
         return None
-    stored = read_size(path)
-    stated = re.fullmatch(r"(\d{1,4})x(\d{1,4})", read_text(path, LENSLET_KEY))
+    picture = open_picture(path)
+    stored, stated = picture.size, re.fullmatch(r"(\d{1,4})x(\d{1,4})", picture.text(LENSLET_KEY))
     lenslet = GridShape(int(stated[2]), int(stated[1])) if stated else LYTRO_LENSLET
     if min(lenslet) < 1 or stored.height % lenslet.rows or stored.width % lenslet.columns:
         raise InputError(
@@ -89,11 +89,12 @@ def read_stereo_file(path: Path) -> MultiView | None:
 
 def _stereo_pictures(path: Path) -> tuple[str, PictureSource, PictureSource] | None:
     """Return the layout, the left eye's picture and the right eye's picture."""
-    if is_heic(path) and (numbers := heic_pair(path)) is not None:
+    kind = open_picture(path).kind
+    if kind == "HEIC" and (numbers := heic_pair(path)) is not None:
         return "spatial HEIC", PictureSource(path, numbers[0]), PictureSource(path, numbers[1])
     if (halves := stated_pair(path)[0]) is not None:
         return "side-by-side stereo", *halves
-    if not is_jpeg(path):
+    if kind != "JPEG":
         return None
     if (leia := open_lif(path)) is not None:
         fields = [0 if view.image == SOURCE_IMAGE else view.image for view in leia.views]
@@ -103,7 +104,7 @@ def _stereo_pictures(path: Path) -> tuple[str, PictureSource, PictureSource] | N
 
 def _leia_picture(path: Path, number: int) -> PictureSource:
     """Return a picture of a Leia image, at the size of the main one: the Lume Pad 2 stores some smaller."""
-    picture, size = PictureSource(path, number), upright_size(path)
+    picture, size = PictureSource(path, number), open_picture(path).upright_size
     stored = source_size(picture)
     return replace(picture, shown_size=size) if number and stored != size and has_shape_of(stored, size) else picture
 

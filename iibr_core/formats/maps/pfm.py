@@ -21,16 +21,18 @@ def read_pfm(path: Path) -> FloatImage:
     The magnitude of the scale is ignored, as by Middlebury and HCI. Colour PFMs are refused.
     """
     path = Path(path)
-    size, dtype, start = _header(path)
-    missing = start + 4 * size.width * size.height - path.stat().st_size
-    if missing > 0:
-        raise InputError(f"{path}: cut off, {missing} bytes are missing for {size} values")
-    return np.array(np.memmap(path, dtype, "r", start, size)[::-1], np.float32)
+    with open_binary(path) as file:
+        size, dtype, start = _header(path, file.read(HEADER_BYTES))
+        missing = start + 4 * size.width * size.height - path.stat().st_size
+        if missing > 0:
+            raise InputError(f"{path}: cut off, {missing} bytes are missing for {size} values")
+        return np.array(np.memmap(file, dtype, "r", start, size)[::-1], np.float32)
 
 
 def read_pfm_size(path: Path) -> ImageSize:
     """Return (height, width) from the header."""
-    return _header(path)[0]
+    with open_binary(path) as file:
+        return _header(path, file.read(HEADER_BYTES))[0]
 
 
 def write_pfm(path: Path, values: FloatImage) -> None:
@@ -41,10 +43,9 @@ def write_pfm(path: Path, values: FloatImage) -> None:
         temporary.write_bytes(header + values[::-1].astype("<f4").tobytes())
 
 
-def _header(path: Path) -> tuple[ImageSize, np.dtype[Any], int]:
-    """Return the size, the type of the values, and the first byte of the values."""
-    with open_binary(path) as file:
-        match = HEADER.match(file.read(HEADER_BYTES))
+def _header(path: Path, start: bytes) -> tuple[ImageSize, np.dtype[Any], int]:
+    """Return the size, the type of the values, and the first byte of the values. start: of the file."""
+    match = HEADER.match(start)
     if match is None:
         raise InputError(f"{path}: is not a PFM file (no header 'Pf width height scale')")
     if match[1] == b"F":

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
-from iibr_core.formats.images.decode import complaint_of, open_header, read_text
+from iibr_core.formats.images.decode import complaint_of, open_header
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.images.rgbd import GREY_TOLERANCE, MAX_COLORED_SHARE
@@ -87,7 +88,7 @@ def read_map_size(path: Path) -> ImageSize:
 def read_map_picture(source: PictureSource) -> MapFile:
     """Read a map that is a picture of a file, or a part of a picture."""
     found = _map_of_picture(source.path, read_source(source))
-    text = text_from(read_text(source.path, KEY))
+    text = text_from(open_picture(source.path).text(KEY))
     if text is None:
         return found
     values = found.values * np.float32(text.scale) + np.float32(text.offset)

@@ -16,7 +16,8 @@ from iibr_core.exports.web_gallery import write_gallery
 from iibr_core.exports.web_streams import Stream, chroma_of, encode_levels, luma_of
 from iibr_core.exports.web_views import MAX_TEXELS, WebForm, form_that_fits
 from iibr_core.formats.images.color_profile import icc_profile
-from iibr_core.formats.images.metadata import read_caption
+from iibr_core.formats.images.metadata import caption_in
+from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.scenes.lens_limits import LensChoice, focus_limits
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
@@ -98,7 +99,7 @@ def test_words_of_the_photo_come_only_if_asked(opened, tmp_path) -> None:
     exif[0x010E], exif[0x013B], exif[0x8298] = "A <i>bridge</i>", 'Ann "A" O\'Neil', "(c) <Ann>"
     exif.get_ifd(0x8825)[1] = "N"
     Image.new("RGB", (8, 8)).save(photo, exif=exif, xmp=XMP.encode())
-    assert read_caption(photo).title == "A <b>title</b>"
+    assert caption_in(read_metadata(photo)).title == "A <b>title</b>"
     source = replace(opened, scene=replace(opened.scene, source=replace(opened.scene.source, path=str(photo))))
     plain, credited = page_of(source)[0], page_of(source, credit=True)[0]
     assert "Ann" not in plain

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from iibr_core.formats.images.file_kinds import raw_kind
 from iibr_core.formats.images.file_notes import file_notes
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import InputError
 
@@ -58,7 +58,7 @@ def test_a_raw_file_is_refused_though_its_preview_can_be_read(tmp_path) -> None:
     with pytest.raises(InputError, match=RAW):
         read_photo(tmp_path / "a.dng")
     PICTURE.save(tmp_path / "jpeg.dng", "JPEG")  # under a wrong name
-    assert raw_kind(tmp_path / "jpeg.dng") is None
+    assert open_picture(tmp_path / "jpeg.dng").kind == "JPEG"
     assert read_photo(tmp_path / "jpeg.dng").size == (48, 64)
 
 

@@ -10,7 +10,7 @@ from PIL import Image
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images import photo as photo_module
-from iibr_core.formats.images.decode import decode, decode_bands
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo, read_thumbnail
 from iibr_core.formats.images.picture import FILM_DIAGONAL_MM
 from iibr_core.formats.images.write import write_image
@@ -177,8 +177,8 @@ def test_large_pictures_are_made_smaller_band_by_band(tmp_path, monkeypatch, nam
     """The bands of a file are its rows; few rows at a time give the same averages."""
     values = np.random.default_rng(4).random((333, 287, 4 if "alpha" in name else 3), np.float32)
     path = save(tmp_path / name, values, **KINDS[name])
-    whole = decode(path)
-    assert np.array_equal(np.concatenate([band.pixels for band in decode_bands(path)]), whole.pixels)
+    whole = open_picture(path).decode()
+    assert np.array_equal(np.concatenate([band.pixels for band in open_picture(path).bands()]), whole.pixels)
     monkeypatch.setattr(photo_module, "MAX_BAND_PIXELS", 3000)
     for size in ((100, 86), (332, 286), (3, 2), (1, 1)):
         photo = read_photo(path, math.prod(size))

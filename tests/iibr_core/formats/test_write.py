@@ -13,10 +13,9 @@ from iibr_core.formats.images.metadata import (
     SETTINGS_KEY,
     PictureMetadata,
     camera_facts,
-    read_caption,
-    read_metadata,
-    settings_text_in,
+    caption_in,
 )
+from iibr_core.formats.images.open_picture import read_metadata, settings_text_in
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat
 from iibr_core.formats.images.write import write_picture
@@ -147,7 +146,7 @@ def test_exif_and_xmp_are_kept(tmp_path, source, ending):
         for gone in ("GDepth", "GPS", "Exposure2012"):
             assert gone not in xmp
     assert settings_text_in(saved) == SETTINGS
-    assert read_caption(saved).title == "A & B"
+    assert caption_in(read_metadata(saved)).title == "A & B"
     write_picture(saved, patches(), PictureFormat(keeps_position=True), metadata)
     with Image.open(saved) as image:
         assert tuple(map(float, image.getexif().get_ifd(GPS)[2])) == (48.0, 51.0, 24.0)
