@@ -13,6 +13,7 @@ from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import upright
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
+from iibr_core.formats.maps.map_names import FOLDER_OF_MAPS, map_name, says_depth
 from iibr_core.formats.maps.reader import MapFile, read_map_file
 from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import Photo, image_size
@@ -121,7 +122,7 @@ def _turned_like_photo(path: Path, found: MapFile, photo: Photo, orientation: in
 
 def _depth_of_map(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) -> OrientedDepth:
     """Return the depth of a map by its header, its name and its kind of numbers."""
-    text, is_depth = found.text, path.stem.endswith("_depth") or choice.is_metric
+    text, is_depth = found.text, _says_depth(path) or choice.is_metric
     if text is not None and text.meaning == "depth":
         estimate = DepthEstimate(found.values, "metres")
         if text.inverse is not None:
@@ -135,6 +136,12 @@ def _depth_of_map(path: Path, found: MapFile, photo: Photo, choice: DepthChoice)
         return _disparity(path, found, photo, choice)
     # Distances by their name, unless they were spread over a range, as pictures are.
     return orient_map(path.name, found, photo, choice, is_depth and not _is_spread(found))
+
+
+def _says_depth(path: Path) -> bool:
+    """Return whether a map's name, or else that of its folder, says depth."""
+    name = path.stem if map_name(path.stem) is not None else path.absolute().parent.name
+    return says_depth(name) and (name == path.stem or FOLDER_OF_MAPS.fullmatch(name) is not None)
 
 
 def _disparity(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) -> OrientedDepth:

@@ -22,7 +22,7 @@ from iibr_core.depth.estimate import DepthEstimate, disparity_from
 from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map
 from iibr_core.depth.models.catalog import model_to_use
-from iibr_core.depth.sidecar import find_sidecars
+from iibr_core.depth.sidecar import find_sidecars, unused_map_notes
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
@@ -32,6 +32,7 @@ from iibr_core.formats.maps.reader import MapFile, read_depth_channel, read_map_
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.registry import EstimateDepth
+from iibr_core.remedies import Remedy, remedy_of
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
@@ -45,6 +46,7 @@ SUBJECTS: dict[DepthKind, str] = {
 }
 """Subjects of the sentence about a source that fails."""
 
+STRETCH = "; if it shows the whole photo, open it as the depth map and stretch it"
 SlowSource = Literal["pair", "model"]
 """Sources that take long: matching two views, and a model."""
 Source = tuple[DepthKind, Callable[[], "PhotoWithDepth | None"]]
@@ -99,7 +101,7 @@ def find_depth(
         except InputError as error:
             if kind == "model" and choice.asks_for_model:
                 raise
-            failure = f"{SUBJECTS[kind]} was not used: {error}"
+            failure = f"{SUBJECTS[kind]} was not used: {error}{STRETCH if remedy_of(error) is Remedy.STRETCH else ''}"
             failures += () if failure in failures else (failure,)
             continue
         if found is not None:
@@ -212,7 +214,8 @@ class _Search:
         raise_if_stopped()
         report_progress(0, 0, "guessing depth")
         estimate = guess_depth(self.photo)
-        return self.finish(DepthOrigin("rough", "rough, guessed without a model"), estimate, unread_parts(self.path))
+        notes = unread_parts(self.path) + unused_map_notes(self.path)
+        return self.finish(DepthOrigin("rough", "rough, guessed without a model"), estimate, notes)
 
     def finish(self, origin: DepthOrigin, estimate: DepthEstimate, notes: tuple[str, ...] = ()) -> PhotoWithDepth:
         """Return the photo with the disparity of an estimate at its size, holes filled, edges drawn to the photo's."""

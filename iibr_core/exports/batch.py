@@ -27,7 +27,7 @@ from iibr_core.exports.kinds import (
     export_path,
     require_export_place,
 )
-from iibr_core.exports.photo_folder import list_photos
+from iibr_core.exports.photo_folder import list_photos, without_maps
 from iibr_core.exports.source import OpenDrawn, open_for_export, write_export
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.outputs import check_output_folder, remove_leftovers
@@ -118,9 +118,9 @@ def photos_in(folders: Sequence[Path]) -> list[tuple[Path, str]]:
 
 def _photos_below(folder: Path, top: str) -> Iterator[tuple[Path, str]]:
     for place, subfolders, _ in os.walk(folder):
-        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
         inner = os.path.join(top, os.path.relpath(place, folder))
         names = sorted(photo.name for photo in list_photos(place))
+        subfolders[:] = without_maps(subfolders, bool(names))
         taken = Counter(name.casefold() for name in names)
         taken.update(os.path.splitext(name)[0].casefold() for name in names)
         for name in names:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from iibr_core.depth.sidecar import SIDECAR_KINDS
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
+from iibr_core.formats.maps.map_names import FOLDER_OF_MAPS, FOLDER_OF_PHOTOS, map_name, photo_keys
 
 PHOTO_ENDINGS = (
     ".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp", ".heic", ".heif", ".hif", ".avif",
@@ -42,14 +42,22 @@ def list_photos(path: str) -> tuple[FolderPhoto, ...]:
     except OSError:
         return ()
     stems = {os.path.splitext(photo.name)[0] for photo in photos}
-    return tuple(photo for photo in photos if not belongs_to_another(os.path.splitext(photo.name)[0], stems))
+    keys = {key for stem in stems if map_name(stem) is None for key in photo_keys(stem)}
+    return tuple(photo for photo in photos if not belongs_to_another(os.path.splitext(photo.name)[0], stems, keys))
 
 
-def belongs_to_another(stem: str, stems: Container[str]) -> bool:
-    """Return whether a picture with this stem is a map or an export of a photo with one of the other stems."""
-    derived = DERIVED_NAME.fullmatch(stem)
-    is_map = any(stem.removesuffix(kind) in stems for kind in SIDECAR_KINDS if stem.endswith(kind))
-    return is_map or (derived is not None and derived[1] in stems)
+def belongs_to_another(stem: str, stems: Container[str], keys: Container[str]) -> bool:
+    """Return whether a picture with this stem is an export of a photo with one of the stems, or its map by the keys."""
+    derived, said = DERIVED_NAME.fullmatch(stem), map_name(stem)
+    return (said is not None and said.key in keys) or (derived is not None and derived[1] in stems)
+
+
+def without_maps(folders: Iterable[str], has_photos: bool) -> list[str]:
+    """Return names of folders, sorted, without hidden ones and those of the maps of photos beside them."""
+    shown = sorted(name for name in folders if not name.startswith("."))
+    if has_photos or any(map(FOLDER_OF_PHOTOS.fullmatch, shown)):
+        shown = [name for name in shown if not FOLDER_OF_MAPS.fullmatch(name)]
+    return shown
 
 
 def first_photo(folder: Path) -> Path | None:

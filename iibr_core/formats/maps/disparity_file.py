@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.formats.maps.map_names import says_depth
 from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -24,7 +25,7 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: Float
     size is resampled, its values scaled by the ratio of widths. Another aspect ratio and empty maps are refused.
     """
     path = Path(path)
-    if path.stem.endswith("_depth"):
+    if says_depth(path.stem):
         raise InputError(f"{path}: holds depth, by its name; views of a light field take disparity, px per view step")
     stored = read_map(path)
     if not has_shape_of(image_size(stored), size):

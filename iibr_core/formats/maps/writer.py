@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from iibr_core.formats.images.write import write_image_file
+from iibr_core.formats.maps.map_names import says_depth
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, InputError
@@ -51,14 +52,14 @@ def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
     """Write an (H, W) map of finite values, whole or not at all; return a note about the file, or "".
 
     text: meaning of the values; PNG, TIFF and EXR keep it. A PNG holds values from 1 to 65535, and its text states
-    their scale and offset; all others hold float32. A name that ends in `_depth` is refused for disparity.
+    their scale and offset; all others hold float32. A name that says depth is refused for disparity.
     """
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in MAP_SUFFIXES:
         raise InputError(f"{path}: a map can be written as {', '.join(MAP_SUFFIXES)}")
-    if text.meaning == "disparity" and path.stem.endswith("_depth"):
-        raise InputError(f"{path}: a name ending in _depth means depth, this is disparity; choose another name")
+    if text.meaning == "disparity" and says_depth(path.stem):
+        raise InputError(f"{path}: a name with _depth means depth, this is disparity; choose another name")
     if kind == ".png":
         return _write_png(path, values, text)
     if kind == ".pfm":

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.models import cache as estimate_cache
@@ -65,6 +66,47 @@ def test_the_order_file_embedded_rough(tmp_path) -> None:
     found = open_with_depth(path, start_from("flat"))
     assert found.origin.kind == "flat"
     assert not found.disparity.values.any()
+
+
+MAPS = {
+    "A.JPG": ["A_depth.PNG", "A_Depth.TIF", "A-depth.png", "a_depthmap.png", "A.depth.png", "A depth (1).bmp",
+              "A_disp.png", "depth_A.png", "A_depth_16bit.png", "depth/A.png", "Depth Maps/A_depth.png"],
+    "A_rgb.png": ["A_depth.png", "A_depthmap.jpg"],
+    "f-1.color.jpg": ["f-1.depth.png"],
+    "rgb_001.png": ["depth_001.png", "depth001.png"],
+    "rgb.png": ["depth.png"],
+    "rgb/000.png": ["depth/000.png", "depth/depth_000.png", "disparity/000.png"],
+    "color/frame-01.color.jpg": ["depth/frame-01.depth.png"],
+}  # fmt: skip
+"""Names of maps by the names of their photos."""
+
+
+@pytest.mark.parametrize(("photo", "name"), [(photo, name) for photo, names in MAPS.items() for name in names])
+def test_a_map_beside_the_photo_is_used_whatever_its_usual_name(tmp_path, photo, name) -> None:
+    values = np.full(SIZE, 60, np.uint8)
+    values[NEAR] = 200
+    for path, picture in ((tmp_path / photo, np.repeat(values[..., None], 3, 2)), (tmp_path / name, values)):
+        path.parent.mkdir(exist_ok=True)
+        Image.fromarray(picture).save(path)
+    (tmp_path / Path(photo).parent / "other_depth.png").write_bytes(b"-")
+    found = open_with_depth(tmp_path / photo, start_from("auto"))
+    assert found.origin.file is not None
+    assert Path(found.origin.file).samefile(tmp_path / name)
+    assert is_nearer_inside(found)
+
+
+def test_maps_that_are_not_used_are_named(tmp_path) -> None:
+    path = photo_file(tmp_path, None)
+    for name in ("scene_depth_old2.png", "SCENE_depth.mat", "scene.npz", "scene_2.png", "else_depth2.png"):
+        (tmp_path / name).write_bytes(b"-")
+    (note,) = (note for note in open_with_depth(path).disparity.notes if note.startswith("Not used"))
+    assert "SCENE_depth.mat, scene.npz, scene_depth_old2.png." in note
+    assert "scene_depth," in note
+    np.save(tmp_path / "scene-disparity.npy", np.zeros(SIZE))  # the name of an export of this program
+    assert open_with_depth(path).origin.kind == "rough"
+    (tmp_path / "scene_depth.png").write_bytes(files.picture(DEPTH[:40, :40], "PNG"))
+    (failure,) = open_with_depth(path).origin.failures
+    assert "stretch it" in failure
 
 
 @pytest.mark.parametrize("depth", [b"no picture", files.picture(DEPTH, "PNG")[:-30], DEPTH[:, :20]])

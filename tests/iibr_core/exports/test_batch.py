@@ -148,6 +148,15 @@ def test_maps_hidden_files_and_others_are_no_photos(tmp_path) -> None:
     assert list_photos(str(tmp_path / "gone")) == ()
 
 
+def test_maps_by_other_names_and_folders_of_maps_are_no_photos(tmp_path) -> None:
+    pictures = ("A.JPG", "A-Depth (1).PNG", "b_rgb.png", "b_depth.png", "in_depth.jpg", "rgb/1.png", "depth/1.png")
+    for name in (*pictures, "deep/depth/1.png"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"-")
+    names = {str(path.relative_to(tmp_path)) for path, _ in photos_in([tmp_path])}
+    assert names == {"A.JPG", "b_rgb.png", "in_depth.jpg", "rgb/1.png", "deep/depth/1.png"}
+
+
 def test_what_was_saved_or_exported_of_a_photo_is_none_of_its_folder(tmp_path) -> None:
     made = ("a-iibr.png", "a-quilt_qs8x6a1.482.png", "a-sbs_2x1.png", "a-rgbd.jpg", "a-b-anaglyph.jpg")
     kept = ("a.jpg", "a-b.png", "gone-iibr.png", "a-iibre.png", "a-quilted.png", "iibr-quilt.png", "-iibr.png")
