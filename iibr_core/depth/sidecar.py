@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.images.decode import read_text
+from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.maps.map_names import (
     ARRAYS,
     FOLDER_OF_MAPS,
@@ -21,6 +21,7 @@ from iibr_core.formats.maps.map_names import (
     photo_keys,
 )
 from iibr_core.formats.maps.writer import KEY, text_from
+from iibr_core.types import InputError
 
 MAX_NAMED = 3
 """Largest number of unused maps that a note names."""
@@ -89,7 +90,10 @@ def _is_own_export(path: Path, stem: str) -> bool:
     """Return whether a file is named as this program proposes for a disparity map that it exports, edits included."""
     if not stem.lower().endswith("-disparity"):
         return False
-    return path.suffix.lower() in (".pfm", ".npy") or text_from(read_text(path, KEY)) is not None
+    try:
+        return path.suffix.lower() in (".pfm", ".npy") or text_from(open_picture(path).text(KEY)) is not None
+    except InputError:
+        return True
 
 
 def _folders_of_maps(folder: Path) -> list[Path]:
