@@ -2,8 +2,9 @@
 
     python -m benchmarks fuzz [--count 1000] [--only jpg,pfm] [--seed 0]
 
-Files on which a reader fails stay in out/fuzz, named by file and number. If a reader ends the whole process or takes
-longer than a minute, the file in question is the last one in out/fuzz/now. Exits with 1 if anything was found.
+Hypothesis chooses the damage. The least damaged copy on which a reader fails stays in out/fuzz. If a reader ends the
+whole process or takes longer than a minute, the file in question is the last one in out/fuzz/now. Exits with 1 if
+anything was found.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from typing import Any
 
 import numpy as np
 import psutil
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
 from PIL import Image, PngImagePlugin
 
 from benchmarks.report import is_wanted
@@ -78,20 +81,26 @@ def main() -> None:
     sys.exit(bool(findings))
 
 
-def fuzz(readers: Mapping[Path, Read], count: int, seed: int, out: Path) -> Iterator[str]:
-    """Yield a line for each damaged copy that a reader neither reads nor refuses, and keep the copy."""
+def fuzz(readers: Mapping[Path, Read], count: int, first_seed: int, out: Path) -> Iterator[str]:
+    """Yield a line for each file of which a damaged copy is neither read nor refused, and keep the copy."""
     originals = {path: path.read_bytes() for path in readers}
     for path, read in readers.items():
-        rng = np.random.default_rng([seed, *path.name.encode()])
-        for number in range(count):
-            path.write_bytes(damage(originals[path], list(originals.values()), rng))
-            faulthandler.dump_traceback_later(TIME_LIMIT_S, exit=True)
-            fault = fault_of(read, path)
-            faulthandler.cancel_dump_traceback_later()
-            if fault:
-                shutil.copy(path, out / f"{number}_{path.name}")
-                yield f"{number}_{path.name}: {fault}"
+        copies = damaged(originals[path], list(originals.values()))
+        check = given(st.just(path), st.just(read), copies)(_check)
+        try:
+            seed(first_seed)(settings(USUAL, max_examples=count)(check))()
+        except AssertionError as error:
+            shutil.copy(path, out / path.name)
+            yield f"{path.name}: {error}".splitlines()[0]
         path.write_bytes(originals[path])
+
+
+def _check(path: Path, read: Read, data: bytes) -> None:
+    path.write_bytes(data)
+    faulthandler.dump_traceback_later(TIME_LIMIT_S, exit=True)
+    fault = fault_of(read, path)
+    faulthandler.cancel_dump_traceback_later()
+    assert not fault, fault
 
 
 def fault_of(read: Read, path: Path) -> str:
@@ -188,34 +197,49 @@ def _views(path: Path) -> list[np.ndarray] | None:
     return scene and [view.colors for view in read_views(scene)[1]]
 
 
-def damage(data: bytes, others: list[bytes], rng: np.random.Generator) -> bytes:
-    """Return data damaged in one of ten ways or in several. others: files of which parts may be copied into it."""
+def damaged(data: bytes, others: list[bytes]) -> st.SearchStrategy[bytes]:
+    """Return damaged copies of a file. others: files of which parts may be copied into it."""
+    parts = st.tuples(st.sampled_from(others), SHARES, LENGTHS).map(lambda drawn: _part(*drawn))
+    piece = st.sampled_from((*EXTREMES, *NUMBERS)) | st.binary(min_size=1, max_size=64) | parts
+    edits = st.lists(st.tuples(SHARES, LENGTHS, piece, st.sampled_from(EDITS)), min_size=1, max_size=6)
+    return st.tuples(edits, st.booleans()).map(lambda drawn: _edited(data, *drawn))
+
+
+def _part(data: bytes, share: float, length: int) -> bytes:
+    first = int(len(data) * share)
+    return data[first : first + length]
+
+
+def _edited(data: bytes, edits: list[tuple[float, int, bytes, Edit]], repairs: bool) -> bytes:
+    """Return a file after edits. repairs: whether a PNG gets right lengths and checksums."""
     is_png = data.startswith(b"\x89PNG")
-    for _ in range(min(rng.geometric(0.5), 8)):
-        data = _damage_once(data, others, rng)[: 1 << 20]
-    return _repaired_png(data) if is_png and rng.random() < 0.5 else data
+    for share, length, piece, edit in edits:
+        first = int(len(data) * share**2)  # rather near the beginning: headers come first
+        data = edit(data[:first], data[first : first + length], data[first + length :], piece)[: 1 << 20]
+    return _repaired_png(data) if is_png and repairs else data
 
 
-def _damage_once(data: bytes, others: list[bytes], rng: np.random.Generator) -> bytes:
-    first = int(len(data) * rng.random() ** 2)  # rather near the beginning: headers come first
-    length, other = int(2 ** rng.uniform(0, 10)), others[rng.integers(len(others))]
-    head, middle, tail = data[:first], data[first : first + length], data[first + length :]
-    extreme, bit = EXTREMES[rng.integers(len(EXTREMES))], 1 << int(rng.integers(8))
-    at = int(rng.integers(len(other) + 1))
-    number = re.search(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?", data[first:20_000])  # written as text
-    begin, end = (first + place for place in (number.span() if number else (0, 0)))
-    return (
-        head + bytes(byte ^ bit for byte in middle[:1]) + middle[1:] + tail,
-        head + extreme + data[first + len(extreme) :],
-        data[:begin] + NUMBERS[rng.integers(len(NUMBERS))] + data[end:],
-        head + other[at : at + length] + tail,
-        head,
-        head + tail,
-        head + bytes(len(middle)) + tail,
-        head + rng.bytes(length) + middle + tail,
-        head + middle * int(2 ** rng.uniform(1, 12)) + tail,
-        head + middle[::-1] + tail,
-    )[rng.integers(10)]
+def _exchange_number(head: bytes, middle: bytes, tail: bytes, piece: bytes) -> bytes:
+    """Put a piece in the place of the next number that is written as text."""
+    return head + re.sub(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?", lambda _: piece, middle + tail, count=1)
+
+
+Edit = Callable[[bytes, bytes, bytes, bytes], bytes]
+EDITS: tuple[Edit, ...] = (
+    lambda head, middle, tail, piece: head + piece + (middle + tail)[len(piece) :],
+    lambda head, middle, tail, piece: head + piece + middle + tail,
+    lambda head, middle, tail, piece: head,
+    lambda head, middle, tail, piece: head + tail,
+    lambda head, middle, tail, piece: head + bytes(len(middle)) + tail,
+    lambda head, middle, tail, piece: head + middle * 2 ** min(len(piece), 12) + tail,
+    lambda head, middle, tail, piece: head + middle[::-1] + tail,
+    _exchange_number,
+)
+"""Kinds of damage: functions of what stands before a part, the part, what stands behind it, and a piece."""
+SHARES, LENGTHS = st.floats(0, 1, exclude_max=True), st.integers(0, 1024)
+USUAL = settings(
+    deadline=None, database=None, phases=(Phase.generate, Phase.shrink), suppress_health_check=list(HealthCheck)
+)
 
 
 def _repaired_png(data: bytes) -> bytes:

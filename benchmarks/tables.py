@@ -17,7 +17,6 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
 from benchmarks.report import ROOT, git, markdown
@@ -29,7 +28,6 @@ NEEDS = {
     "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
     "MODEL": "a depth network as an ONNX file: MODEL=FILE",
     "X": "Xvfb and xdotool",
-    "torch": "torch: pip install '.[train]'",
 }
 
 
@@ -49,8 +47,7 @@ class Table:
     @property
     def needs(self) -> list[str]:
         """Keys of NEEDS that the command needs."""
-        special = {"window": "X", "pages": "X", "ablation": "torch"}
-        return [need for need in NEEDS if need in self.command.split() or need == special.get(self.name)]
+        return [need for need in NEEDS if need in self.command.split() or (need, self.name) == ("X", "window")]
 
     @property
     def words(self) -> str:
@@ -70,10 +67,6 @@ TABLES = (
     Table("disparity", ACCURACY, "disparity --data DATA", 3),
     Table("guess", ACCURACY, "guess --data DATA", 1),
     Table("window", ACCURACY, "window", 1),
-    Table("ablation", ACCURACY, "ablation --maps exact,soft --drawn 4 --data DATA", 6),
-    Table("free-views", ACCURACY, "free-views", 2),
-    Table("pages", "docs/exports.md", "pages --data DATA", 6),
-    Table("method", "", "method-figures docs/method", 1),
     Table("pictures", "", "docs/make_pictures.py docs/gallery", 4),
 )
 
@@ -103,8 +96,8 @@ def write_table(table: Table, given: Mapping[str, str], root: Path = ROOT) -> bo
 
     A table that this machine cannot make is named and stays. given: paths of DATA and MODEL.
     """
-    here = {"X": all(map(shutil.which, ("Xvfb", "xdotool"))), "torch": find_spec("torch") is not None}
-    missing = [NEEDS[need] for need in table.needs if not (need in given or here.get(need))]
+    has_x = all(map(shutil.which, ("Xvfb", "xdotool")))
+    missing = [NEEDS[need] for need in table.needs if not (need in given or (need == "X" and has_x))]
     if missing:
         print(f"{table.name}: not made; needs {', '.join(missing)}")
         return True

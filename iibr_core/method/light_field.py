@@ -81,10 +81,6 @@ class ViewMaker:
         view = self._outer_views.get(offset) or self._renderer.render(rays, offset, threads)
         return finish(rays, offset, view, threads)
 
-    def views(self, offsets: Iterable[ViewOffset]) -> Iterator[View]:
-        """Return an iterator over the views at these offsets, in their order, several made at a time."""
-        return side_by_side(lambda offset: self.view(offset, 1), offsets)
-
     def generate(
         self,
         grid: GridShape,

@@ -17,8 +17,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-import psutil
-
 from tests.browsers.page import Page, PageError, Place, required
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -104,12 +102,6 @@ class Tab(Page):
         """Media features, as prefers_color_scheme="dark"."""
         media = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
         self.call("Emulation.setEmulatedMedia", features=media)
-
-    def memory(self) -> int:
-        """Return the bytes that all pages and the graphics process hold; shared ones count in part (PSS)."""
-        processes = self._pipe.call("SystemInfo.getProcessInfo", {})["processInfo"]
-        pages = [process["id"] for process in processes if process["type"] in ("renderer", "GPU")]
-        return sum(psutil.Process(number).memory_full_info().pss for number in pages)
 
     @property
     def requests(self) -> list[str]:
