@@ -160,6 +160,7 @@ EXPORTS = {
     "sbs": _stereo("Side by side", "sbs"),
     "half-sbs": _stereo("Side by side, half width", "half-sbs"),
     "over-under": _stereo("Left eye over right", "over-under"),
+    "half-over-under": _stereo("Left eye over right, half height", "half-over-under"),
     "cross-eyed": _stereo("Side by side, crossed", "cross-eyed", path=""),
     "anaglyph": _stereo("Anaglyph, red-cyan", "anaglyph", path=""),
     "spatial-photo": ExportKind(

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.formats.images.metadata import PictureMetadata
+from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat
 from iibr_core.formats.images.write import write_picture
 from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
@@ -144,11 +146,12 @@ class ExportSource:
         self, path: Path, pixels: NDArray[Any], form: PictureFormat = AS_USUAL, color_space: ColorSpace = SRGB
     ) -> None:
         """Write a picture (H, W, 3) of this colour space with the Exif and XMP of the photo."""
-        from iibr_core.formats.images.metadata import PictureMetadata
-        from iibr_core.formats.images.open_picture import read_metadata
+        write_picture(path, pixels, form, self.metadata, color_space)
 
-        photo = PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
-        write_picture(path, pixels, form, PictureMetadata(photo.exif, photo.xmp), color_space)
+    @property
+    def metadata(self) -> PictureMetadata:
+        """Exif and XMP of the photo; none of a light field."""
+        return PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
 
 
 OpenDrawn = Callable[[Source, float, LensChoice, Callable[[Scene], None], OpticsOf | None], ExportSource]

@@ -24,8 +24,10 @@ from iibr_core.formats.images.picture_source import (
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.types import ImageSize, InputError, image_size
 
-FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
-"""Endings of names that players know: left first, side by side, the second at half width; top and bottom."""
+FULL_TAG, HALF_TAG, OVER_TAG, HALF_OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB", "_HTAB"
+"""Endings of names that players know: left first, side by side, the second at half width; top and bottom, the last at
+half height.
+"""
 TAG = re.compile(
     r"[-_. (\[](?:(half)[-_. ]?|(h)[-_]?(?=sbs|t|ou)|full[-_. ]?|f(?=sbs|t|ou))?"
     r"(?:sbs|2x1|lr[bpq]?|rl[bpq]?|left-?right|right-?left|side-?by-?side|cross(?:ed)?(?:-?eyed?)?|3dh"

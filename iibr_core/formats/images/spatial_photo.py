@@ -17,9 +17,12 @@ from PIL import Image
 from iibr_core.formats.animations import require_even
 from iibr_core.formats.files import PARSE_ERRORS, reason_of
 from iibr_core.formats.images.iso_boxes import associations, box, boxes, joined, meta_boxes
+from iibr_core.formats.images.metadata import PictureMetadata, exif_for
+from iibr_core.formats.images.xmp import xmp_for
 from iibr_core.formats.outputs import write_file
-from iibr_core.types import InputError, image_size
+from iibr_core.types import SRGB, InputError, image_size
 
+NO_METADATA = PictureMetadata()
 QUALITY = 92
 INTRINSICS = UUID("22cc04c7-d6d9-4e07-9d90-4eb6ecbaf3a3").bytes
 EXTRINSICS = UUID("4363e914-5b7d-4aab-97ae-bea69803b434").bytes
@@ -31,10 +34,16 @@ DISPARITY_ADJUSTMENT = 293
 EYES_APART_UM = 63_000
 
 
-def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8], focal_px: float) -> None:
+def write_spatial_photo(
+    path: Path,
+    left: NDArray[np.uint8],
+    right: NDArray[np.uint8],
+    focal_px: float,
+    metadata: PictureMetadata = NO_METADATA,
+) -> None:
     """Write two sRGB-encoded pictures (H, W, 3), even sizes, whole or not at all.
 
-    focal_px: focal length of both, in pixels.
+    focal_px: focal length of both, in pixels. metadata: that of the photo, kept as in other saved pictures.
     """
     import pillow_heif
 
@@ -45,7 +54,9 @@ def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.u
         file = pillow_heif.from_pillow(Image.fromarray(np.ascontiguousarray(left)))
         file.add_from_pillow(Image.fromarray(np.ascontiguousarray(right)))
         encoded = BytesIO()
-        file.save(encoded, quality=QUALITY, chroma=420, primary_index=0)
+        exif = exif_for(metadata.exif, image_size(left), SRGB, keeps_position=False)
+        kept = {"exif": exif.tobytes() if exif else None, "xmp": xmp_for(metadata.xmp, {}) or None}
+        file.save(encoded, quality=QUALITY, chroma=420, primary_index=0, **kept)
         stored = _with_pair(encoded.getvalue(), focal_px / left.shape[1])
     except PARSE_ERRORS as error:
         raise InputError(f"{path}: cannot be encoded as a spatial photo ({reason_of(error)})") from error
@@ -60,6 +71,7 @@ def _with_pair(file: bytes, focal: float) -> bytes:
     iprp = dict(boxes(meta[b"iprp"]))
     entries, _ = associations(iprp[b"ipma"])
     left, right = entries
+    (items_count,) = struct.unpack_from(">H", meta[b"iloc"], 6)  # ids of groups differ from those of items
     first = sum(1 for _ in boxes(iprp[b"ipco"])) + 1  # properties are counted from 1, in their order
     entries[left] += [first, first + 1, first + 3]
     entries[right] += [first, first + 2, first + 3]
@@ -75,7 +87,7 @@ def _with_pair(file: bytes, focal: float) -> bytes:
     items = [struct.pack(">HB", item, len(numbers)) + bytes(numbers) for item, numbers in entries.items()]
     iprp[b"ipma"] = struct.pack(">II", 0, len(items)) + b"".join(items)
     meta[b"iprp"] = joined(iprp)
-    meta[b"grpl"] = box(b"ster", struct.pack(">IIIII", 0, max(left, right) + 1, 2, left, right))
+    meta[b"grpl"] = box(b"ster", struct.pack(">IIIII", 0, max(left, right) + items_count, 2, left, right))
     meta[b"iloc"] = _moved_iloc(meta[b"iloc"], 4 + len(joined(meta)) - len(top[b"meta"]))
     top[b"meta"] = head + joined(meta)
     return joined(top)

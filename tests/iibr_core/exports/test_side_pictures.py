@@ -10,7 +10,10 @@ from PIL import Image
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.formats.images.heic import heic_pair
 from iibr_core.formats.images.iso_boxes import boxes
+from iibr_core.formats.images.metadata import ARTIST, PictureMetadata
+from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.scenes.screen_size import ScreenSize
@@ -100,6 +103,9 @@ def test_stereo_pictures(source, tmp_path) -> None:
     half = exported(source, "half-sbs", tmp_path / "a_LRF_Half_SBS.png")
     assert (half.name, pixels(half).shape) == ("a_LRF_Half_SBS.png", (64, 96, 3))
     assert np.abs(pixels(half)[:, :48] - seen(source, -1.0, 48)).max() <= 1
+    flat = exported(source, "half-over-under", tmp_path / "b.png")
+    assert (flat.name, pixels(flat).shape) == ("b_HTAB.png", (64, 96, 3))
+    assert np.abs(pixels(flat)[32:] - seen(source, 1.0, 96, 32)).max() <= 1
 
 
 def test_colour_of_an_anaglyph_is_not_coarser_than_its_light(source, tmp_path) -> None:
@@ -140,7 +146,13 @@ def test_both_pictures_of_a_spatial_photo_are_what_the_renderer_shows(source, tm
 def test_boxes_of_a_spatial_photo_are_as_apples(tmp_path, size) -> None:
     """4:2:0 of the Main Still Picture profile, whole; the left picture is the photo and the first of the pair."""
     eye = np.random.default_rng(0).integers(0, 256, (*size, 3), np.uint8)
-    write_spatial_photo(tmp_path / "a.heic", eye, 255 - eye, focal_px=90.0)
+    exif = Image.Exif()
+    exif[ARTIST], exif.get_ifd(0x8769)[0x9003] = "A B", "2020:01:02 03:04:05"
+    write_spatial_photo(tmp_path / "a.heic", eye, 255 - eye, 90.0, PictureMetadata(exif.tobytes()))
+    kept = read_metadata(tmp_path / "a.heic").exif
+    assert b"A B" in kept
+    assert b"2020:01:02" in kept
+    assert heic_pair(tmp_path / "a.heic") is not None
     top = list(boxes((tmp_path / "a.heic").read_bytes()))
     meta = dict(boxes(dict(top)[b"meta"][4:]))
     properties = list(boxes(dict(boxes(meta[b"iprp"]))[b"ipco"]))

@@ -64,6 +64,7 @@ def test_another_kind_keeps_the_name_that_was_typed() -> None:
         ("sbs", "e_2x1.jpg", "e_2x1.jpg"),
         ("half-sbs", "e_half_sbs.png", "e_half_sbs.png"),
         ("over-under", "e_ou.png", "e_ou.png"),
+        ("half-over-under", "e-hou.png", "e-hou.png"),
         ("sbs", "e.png", "e_LRF_Full_SBS.png"),
         ("half-sbs", "e_sbs.png", "e_sbs_LRF_Half_SBS.png"),
         ("depth", "a_depth.pfm", "a_depth.pfm"),
