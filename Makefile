@@ -13,10 +13,9 @@ HEADSET := tests/web/node_modules
 
 .PHONY: run test test-bundle bench figures fuzz site licences install kernels dist bundle deb rpm clean
 
-# What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
 	@.ci/system-libraries run
-	@$(BIN)/iibr demo
+	@mkdir -p out && cd out && ../$(BIN)/iibr demo
 
 test: install kernels
 	@.ci/system-libraries test
@@ -63,11 +62,13 @@ licences: install
 
 install: $(READY_TESTS)
 
+# All is compiled to bytecode here, by all cores: pip takes one, and a start keeps none where PYTHONDONTWRITEBYTECODE is set.
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "iibr needs Python 3.11 or later; name one with: make PYTHON=python3.11 ..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) --no-compile -e .
+	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib iibr_core viewer || true
 	@touch $(READY)
 
 $(READY_TESTS): $(READY)

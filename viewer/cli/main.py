@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,28 +13,63 @@ import typer
 from typer.core import TyperGroup
 
 from iibr_core.types import InputError
-from viewer.cli.batch import batch
-from viewer.cli.depth import depth
-from viewer.cli.evaluate import evaluate
-from viewer.cli.export import export
-from viewer.cli.generate import generate
 from viewer.cli.messages import print_notes
-from viewer.cli.models import models
-from viewer.cli.open import open_photos
-from viewer.cli.plan import plan
-from viewer.cli.screenshot import screenshot
-from viewer.cli.train import train
 from viewer.cli.version import print_version
-from viewer.cli.view import demo, open_last_scene, view
 
+COMMANDS = {
+    "view": "view.view",
+    "export": "export.export",
+    "screenshot": "screenshot.screenshot",
+    "generate": "generate.generate",
+    "depth": "depth.depth",
+    "batch": "batch.batch",
+    "plan": "plan.plan",
+    "demo": "demo.demo",
+    "evaluate": "evaluate.evaluate",
+    "train": "train.train",
+    "open": "open.open_photos",
+    "models": "models.models",
+}
+"""Subcommands in the order of the help: file of this folder and name in it."""
 FORMER_NAMES = {"--out": "--output"}
 """Former names of options, which scripts still use."""
 FORMER_OPTIONS = ("--quality", "--memory")
 """Options of earlier versions, each with a value, which are ignored."""
 
 
+@cache
+def _load(name: str) -> Any:
+    """Import a subcommand and return it as Typer runs it."""
+    file, _, attribute = COMMANDS[name].partition(".")
+    found = getattr(import_module(f"viewer.cli.{file}"), attribute)
+    if not isinstance(found, typer.Typer):
+        function, found = found, typer.Typer(add_completion=False, rich_markup_mode="rich")
+        found.command(name)(function)
+    return typer.main.get_command(found)
+
+
+class Loaded(Mapping[str, Any]):
+    """The subcommands by name; each is imported when it is looked up."""
+
+    def __getitem__(self, name: str) -> Any:
+        return _load(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in COMMANDS
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
 class Commands(TyperGroup):
     """The subcommands. A path in place of a subcommand is viewed."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = Loaded()  # type: ignore[assignment]  # it is only read
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command and its arguments."""
@@ -61,10 +99,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (view, export, screenshot, generate, depth, batch, plan, demo, evaluate, train):
-    app.command()(command)
-app.command("open")(open_photos)
-app.add_typer(models, name="models")
 
 
 @app.callback()
@@ -81,6 +115,8 @@ def iibr(
     """
     if context.invoked_subcommand is not None:
         return
+    from viewer.cli.view import open_last_scene
+
     try:
         open_last_scene()
     except InputError as error:

@@ -13,7 +13,7 @@ from viewer.cli.option_records import flag
 
 EXIT_DECLINED = 1
 
-models = typer.Typer(invoke_without_command=True)
+models = typer.Typer(name="models", invoke_without_command=True, add_completion=False)
 
 
 @models.callback()

@@ -1,4 +1,4 @@
-"""`iibr`, `iibr view` and `iibr demo`: the window."""
+"""`iibr` and `iibr view`: the window."""
 
 from __future__ import annotations
 
@@ -55,14 +55,6 @@ def view(
     shown = () if stereo_mode is None else (do(stereo.set_mode, stereo_mode), do(stereo.show, True))
     display = () if calibration is None else (do(stereo.show_on, read_calibration(calibration)),)
     open_window(source, scene.depth_strength, do(switch, tracker), *shown, *display)
-
-
-def demo() -> None:
-    """Open the viewer on the demo photo.
-
-    Example: iibr demo
-    """
-    open_window(Source(str(demo_photo())))
 
 
 def open_last_scene() -> None:

@@ -25,11 +25,11 @@ from tests.iibr_core import red_inpainter
 from tests.iibr_core.known_scenes import write_llff_row
 from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
 from tests.viewer.conftest import HEIGHT, WIDTH
-from viewer.cli.main import app
+from viewer.cli.main import COMMANDS
 from viewer.cli.options import grid_from_text, number_from_text, size_from_text, view_from_text
+from viewer.model.demo_photo import demo_photo
 
 ROOT = Path(__file__).parents[3]
-COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands if command.callback]
 
 
 def run_apart(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -39,7 +39,7 @@ def run_apart(code: str, **environment: str) -> subprocess.CompletedProcess[str]
     return subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, env=env, timeout=120)
 
 
-@pytest.mark.parametrize("command", ["", "models", *COMMANDS])
+@pytest.mark.parametrize("command", ["", *COMMANDS])
 def test_help_describes_every_option_without_absurd_limits(iibr: Iibr, command: str) -> None:
     text = output_of(iibr(*filter(None, [command]), "--help"))
     assert "Example: iibr " + command in text or not command
@@ -53,6 +53,26 @@ def test_without_a_display_help_comes_with_the_reason(tmp_path: Path) -> None:
     assert "Usage: " in output_of(done)
     (line,) = done.stderr.splitlines()
     assert line.startswith("note: no window can be opened")
+
+
+def test_the_demo_without_a_display_is_drawn_into_a_new_folder(tmp_path: Path) -> None:
+    own = tmp_path / "iibr-demo" / "middle.png"
+    own.parent.mkdir()
+    own.write_text("the user's")
+    done = run_forked("demo", cwd=tmp_path)
+    names = re.findall(r"(?m)^(/.*\.png): ", output_of(done))
+    middle, corners, focus = (np.asarray(Image.open(name).convert("RGB"), np.float32) for name in names)
+    photo = np.asarray(Image.open(demo_photo()).convert("RGB"))
+    assert np.abs(middle - photo).max() <= 1
+    parts = [part for row in np.split(corners, 2) for part in np.split(row, 2, axis=1)]
+    assert all(np.abs(part - photo).mean() > 5 for part in parts)
+    far, _, near = np.split(focus, 3, axis=1)
+    shelf, engine = np.s_[:100, 450:], np.s_[250:375, 300:440]
+    for part, sharp, blurred in ((shelf, far, near), (engine, near, far)):
+        assert np.abs(np.diff(sharp[part], axis=1)).mean() > 1.5 * np.abs(np.diff(blurred[part], axis=1)).mean()
+    assert "With a display, `iibr demo` opens a window" in done.stdout
+    assert done.stderr.startswith("note: no window can be opened")
+    assert own.read_text() == "the user's"
 
 
 @pytest.mark.parametrize("name", ["scene.png", "missing/photo"])
@@ -296,7 +316,17 @@ def test_the_window_comes_before_heavy_imports_and_with_one_glfw(display: str) -
     assert done.stdout.splitlines() == ["[]", "1"], done.stderr
 
 
-def test_help_imports_nothing_heavy() -> None:
-    heavy = ("torch", "numba", "moderngl", "imgui_bundle", "scipy", "skimage", "matplotlib", "OpenImageIO", "msgspec")
-    code = f"import sys, viewer.cli.main; print([name for name in {heavy} if name in sys.modules])"
-    assert run_apart(code).stdout.strip() == "[]"
+LIGHT = """
+import sys
+from viewer.entry import run
+for words in (["models"], ["view", "missing.png"], ["--help"], *([name, "--help"] for name in %r)):
+    sys.argv = ["iibr", *words]
+    run()
+print([name for name in %r if name in sys.modules])
+"""
+
+
+def test_commands_that_compute_nothing_import_nothing_heavy(tmp_path: Path) -> None:
+    heavy = "torch", "numba", "moderngl", "imgui_bundle", "scipy", "skimage", "matplotlib", "OpenImageIO", "msgspec"
+    done = run_apart(LIGHT % (list(COMMANDS), heavy), XDG_DATA_HOME=str(tmp_path))
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
