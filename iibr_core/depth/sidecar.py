@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.maps.map_names import (
     ARRAYS,
     FOLDER_OF_MAPS,
@@ -20,7 +19,6 @@ from iibr_core.formats.maps.map_names import (
     map_name,
     photo_keys,
 )
-from iibr_core.formats.maps.writer import KEY, text_from
 from iibr_core.types import InputError
 
 MAX_NAMED = 3
@@ -90,6 +88,9 @@ def _is_own_export(path: Path, stem: str) -> bool:
     """Return whether a file is named as this program proposes for a disparity map that it exports, edits included."""
     if not stem.lower().endswith("-disparity"):
         return False
+    from iibr_core.formats.images.open_picture import open_picture  # help and window come before it
+    from iibr_core.formats.maps.writer import KEY, text_from
+
     try:
         return path.suffix.lower() in (".pfm", ".npy") or text_from(open_picture(path).text(KEY)) is not None
     except InputError:

@@ -31,9 +31,9 @@ from iibr_core.runtime.work import (
     stoppable,
     watched,
 )
-from iibr_core.scenes.light_fields import READING, open_settled, read_dense
+from iibr_core.scenes.light_fields import open_settled, read_dense
 from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, view_maker_of
-from iibr_core.scenes.scene import MAKING, LoadedPhoto, Source
+from iibr_core.scenes.scene import MAKING, READING, LoadedPhoto, Source
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
 Parallax = Literal["viewing", "literal"]

@@ -79,13 +79,13 @@ class KernelLocator:
     """Place of a compiled kernel, and its stamp: the public hook of Numba 0.68."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._file = Path(inspect.getfile(function)).resolve()
+        self._file = _resolve(inspect.getfile(function))
         self._folder = kernel_folder().joinpath(*self._file.parent.relative_to(PACKAGE).parts)
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> KernelLocator | None:
         """Return the locator of one function, None for those of other packages."""
-        return cls(function) if Path(file).resolve().is_relative_to(PACKAGE) else None
+        return cls(function) if _resolve(file).is_relative_to(PACKAGE) else None
 
     def get_cache_path(self) -> str:
         """Return the folder of the files of this kernel."""
@@ -145,6 +145,13 @@ def _copy_kernels(target: Path) -> None:
                 raise
 
 
+@cache
+def _resolve(file: str) -> Path:
+    """Return the absolute path of a file of sources, which holds many kernels."""
+    return Path(file).resolve()
+
+
+@cache
 def sources_hash(path: Path) -> str:
     """Return the hash of a file and of all files of this package that it imports, directly or not. Raises OSError."""
     found, left = {path}, [path]

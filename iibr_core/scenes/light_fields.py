@@ -34,7 +34,7 @@ from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.method.memory import require_memory, view_bytes
 from iibr_core.runtime.work import Cancelled, report_progress
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.scene import READING, Scene, Source
 from iibr_core.types import (
     FloatImage,
     GridShape,
@@ -48,7 +48,6 @@ from iibr_core.types import (
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Range of the focus in a light field without disparity, in pixels per view step."""
 FROM_VIEWS = "the views themselves"
-READING = "reading views"
 
 
 @dataclass(frozen=True, eq=False)

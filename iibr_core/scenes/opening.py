@@ -20,9 +20,9 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import is_stopped
-from iibr_core.scenes.light_fields import READING, load_light_field
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, sketch_photo, views_of_photo
 from iibr_core.scenes.scene import (
+    READING,
     DepthSettings,
     LoadedPhoto,
     Progress,
@@ -133,6 +133,8 @@ def _results_of_photo(
 
 
 def _results_of_light_field(request: SceneRequest) -> Iterator[SceneReady | ViewReady]:
+    from iibr_core.scenes.light_fields import load_light_field  # photos start without its modules
+
     for field in load_light_field(request.source, request.takes_drafts):
         centre = next(field.views)
         yield SceneReady(request.generation, field.scene, None, centre)

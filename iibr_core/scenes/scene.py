@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas
 
 AS_USUAL = DepthChoice()
+READING = "reading views"
 MAKING = "making views"
 """Words for the work on views."""
 

@@ -47,13 +47,13 @@ def print_notes(*notes: str | None, origin: DepthOrigin | None = None) -> None:
 @contextmanager
 def show_progress(doing: str, counts: bool = False) -> Iterator[None]:
     """Show the progress that the block reports, see `report_progress`, as a bar. counts: with numbers."""
+    if sys.stderr is None or not sys.stderr.isatty():  # a bar would leave empty lines
+        yield
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn
 
     console = Console(stderr=True)
-    if not console.is_terminal:  # a bar would leave empty lines
-        yield
-        return
     columns = ("{task.description}", BarColumn(), TaskProgressColumn(), "{task.fields[details]}")
     time_left = TimeLeft()
     with Progress(*columns, console=console, transient=True) as bar:

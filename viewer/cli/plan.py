@@ -22,7 +22,7 @@ def plan(
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
 ) -> None:
-    """Show the plan of a photo, its grid, parallax and memory, without making views; of views, what they are recognised as.
+    """Show grid, parallax and memory planned for a photo, without making views; of views, what they are recognised as.
 
     Example: iibr plan photo.png --disparity photo.pfm
     """

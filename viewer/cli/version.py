@@ -7,12 +7,13 @@ import platform
 import typer
 
 from iibr_core.types import InputError
-from viewer.model.version import program_commit, program_version
 
 
 def print_version(is_wanted: bool) -> None:
     """Print the versions and end the program if that is wanted."""
     if is_wanted:
+        from viewer.model.version import program_commit, program_version
+
         print(f"iibr {program_version()}")
         print(f"commit {program_commit()}")
         print(f"OpenGL {_gl_version()}")
