@@ -32,7 +32,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset
 
-FLYING, CALM = 0.12, 0.06
+MIN_FLYING_DIFFERENCE, MAX_CALM_DIFFERENCE = 0.12, 0.06
 """Least difference of a flying pixel from the median around it, and largest one of the truth's."""
 TIMED_VIEWS = 4
 """Number of views that are timed: none is a corner, which set-up may have made."""
@@ -138,7 +138,7 @@ def _stored(view: FloatImage) -> FloatImage:
 def judge_view(view: FloatImage, truth: FloatImage, hole: Mask) -> tuple[float, ...]:
     """Return the figures of a view (H, W, 3), seconds apart; NaN for a part without pixels."""
     around = _grown(hole, 12)
-    flying = around & (_off_median(view) > FLYING) & (_off_median(truth) < CALM)
+    flying = around & (_off_median(view) > MIN_FLYING_DIFFERENCE) & (_off_median(truth) < MAX_CALM_DIFFERENCE)
     parts = None, ~_grown(hole, 1), _grown(hole, 3) & ~hole, hole
     share = 1e4 * flying.sum() / around.sum() if around.any() else np.nan
     return (*(bounded_psnr(view, truth, part) for part in parts), float(share))

@@ -33,7 +33,7 @@ MAX_DISPARITY_WIDTHS = 4.0
 
 LARGEST_LENGTH = 1e12
 """Largest coordinate of a camera, in any unit: products of larger ones lose all digits."""
-MOST_FOCAL_WIDTHS = 100.0
+MAX_FOCAL_WIDTHS = 100.0
 """Longest focal length, that of a telescope, in widths of the picture; the shortest is its inverse."""
 
 
@@ -179,10 +179,10 @@ class Camera:
         if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
             raise InputError(f"{self.source}: its axes are no rotation; get the whole file again")
         widths = tuple(focal / max(self.size) for focal in self.focal_px)
-        if min(self.size) < 1 or not all(1 / MOST_FOCAL_WIDTHS <= width <= MOST_FOCAL_WIDTHS for width in widths):
+        if min(self.size) < 1 or not all(1 / MAX_FOCAL_WIDTHS <= width <= MAX_FOCAL_WIDTHS for width in widths):
             raise InputError(
                 f"{self.source}: pictures of {self.size} with focal lengths of {self.focal_px[0]:g} and"
-                f" {self.focal_px[1]:g} px; give the longer side times 1/{MOST_FOCAL_WIDTHS:g} to {MOST_FOCAL_WIDTHS:g}"
+                f" {self.focal_px[1]:g} px; give the longer side times 1/{MAX_FOCAL_WIDTHS:g} to {MAX_FOCAL_WIDTHS:g}"
             )
         if not 0 < near < far:
             raise InputError(f"{self.source}: depths from {near:g} to {far:g} are not positive and ascending")

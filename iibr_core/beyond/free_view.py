@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from iibr_core.beyond.landed_squares import SAMPLES, draw_rays, project, rows_landed_on
 from iibr_core.inpainting.background import continue_farthest
-from iibr_core.method.look_up import SOLE, cubic, cubic_on_surface
+from iibr_core.method.look_up import MIN_SOLE_SHARE, cubic, cubic_on_surface
 from iibr_core.method.rays import RaySet
 from iibr_core.method.view import View
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
-from iibr_core.runtime.tiling import MOST_BAND_PIXELS, in_bands
+from iibr_core.runtime.tiling import MAX_PIXELS_AT_ONCE, in_bands
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
 from iibr_core.types import Camera, ImageSize, Margins
 
@@ -79,7 +79,7 @@ def render_free_view(
             view.colors, view.disparity, view.occluded, view.inpainted,
         )  # fmt: skip
 
-    in_bands(band, size, most_pixels=MOST_BAND_PIXELS // SAMPLES**2)
+    in_bands(band, size, most_pixels=MAX_PIXELS_AT_ONCE // SAMPLES**2)
     if view.occluded.any():
         continue_farthest(view.colors, view.disparity, view.occluded, rays.farthest_views, rays.stages)
     return view
@@ -158,7 +158,7 @@ def _resolve(rays, inverses, frame, first_row, nearest, seen, colors, disparity,
                     is_within = left - 0.5 <= at_x <= width - right - 0.5 and top - 0.5 <= at_y <= height - bottom - 0.5
                     inpainted[y, x] = k >= photo_images or not is_within
                 # A sole surface stays encoded; the linear light of several adds up.
-                if count >= SOLE * landed:
+                if count >= MIN_SOLE_SHARE * landed:
                     colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = max(r, 0.0), max(g, 0.0), max(b, 0.0)
                 else:
                     sum_r += count * linear_scalar(r) / landed

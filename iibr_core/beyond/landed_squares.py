@@ -18,9 +18,9 @@ from iibr_core.types import FloatImage
 
 SAMPLES = 3
 """Number of samples across a target pixel and down; a square covers a sample entirely or not at all."""
-LEAST_DEPTH = 1e-3
+MIN_DRAWN_DEPTH = 1e-3
 """Least depth of rays that are drawn, as a share of their depth in the photo."""
-MOST_MAGNIFIED_PX = 16.0
+MAX_SQUARE_PX = 16.0
 """Largest square that is drawn: the photo has no details for larger ones."""
 COVERING_ORDER = np.array([4, 0, 8, 2, 6, 1, 7, 3, 5]).argsort()
 """Order in which a ray that covers its pixel in part takes samples, so that any share is spread over the pixel."""
@@ -43,7 +43,7 @@ def rows_landed_on(rays: RaySet, k: int, matrix: NDArray[np.float64]) -> FloatIm
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         points = np.stack([(x, y, np.ones(low.shape), d) for (x, y), d in zip(corners, bounds)])
         y, w = np.einsum("ij,cjvu->icvu", matrix[1:3], points)
-        rows, is_ahead = y / w, (w > LEAST_DEPTH).all(axis=0)
+        rows, is_ahead = y / w, (w > MIN_DRAWN_DEPTH).all(axis=0)
     # Cells that reach behind the camera may land anywhere.
     first, last = np.where(is_ahead, rows.min(axis=0), -np.inf), np.where(is_ahead, rows.max(axis=0), np.inf)
     has_rays = low <= high
@@ -151,7 +151,7 @@ def _land_squares(disparity, m, y, sealed_step, corners, is_drawn):
                     total, count = total + disparity[v, u], count + 1
             at_x, at_y, d, w = project(m, 0.5 * (x + u), 0.5 * (y + v), total / count)
             corners[x, corner, 0], corners[x, corner, 1], corners[x, corner, 2] = at_x, at_y, d
-            is_drawn[x] = is_drawn[x] and w > LEAST_DEPTH
+            is_drawn[x] = is_drawn[x] and w > MIN_DRAWN_DEPTH
 
 
 @kernel
@@ -170,7 +170,7 @@ def _draw_squares(corners, is_drawn, coverage, index, photo_images, ahead, first
             left, right = x0 + min(0.0, x1, x2), x0 + max(0.0, x1, x2)
             top, bottom = y0 + min(0.0, y1, y2) - first_row, y0 + max(0.0, y1, y2) - first_row
             # Skips triangles that are seen from behind, not finite or too large.
-            if not (area > 1e-9 and right - left <= MOST_MAGNIFIED_PX and bottom - top <= MOST_MAGNIFIED_PX):
+            if not (area > 1e-9 and right - left <= MAX_SQUARE_PX and bottom - top <= MAX_SQUARE_PX):
                 continue
             if not (right > -0.5 and left * SAMPLES < columns and bottom > -0.5 and top * SAMPLES < rows):
                 continue

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known, number_pixels
+from iibr_core.inpainting.nearest_known import MAX_HOLE_PIXELS_AT_ONCE, nearest_known, number_pixels
 from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
@@ -81,7 +81,7 @@ def continues_in_front(
     def weigh(part: slice) -> None:
         _weigh_in_front(disparity, pixels[part], known[part], photo_disparity, offset, one_surface, in_front)
 
-    in_pieces(weigh, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
+    in_pieces(weigh, pieces_of(len(pixels), MAX_HOLE_PIXELS_AT_ONCE), threads)
     return in_front
 
 
@@ -101,7 +101,7 @@ def _fill_view(
     changed = np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:
-        in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
+        in_pieces(step, pieces_of(len(pixels), MAX_HOLE_PIXELS_AT_ONCE), threads)
 
     def fill(part: slice) -> None:
         at = pixels[part], known[part], reach[part]

@@ -36,9 +36,9 @@ VOTE_BINS = 24
 """Number of bins that the range of the disparities around a pixel is divided into."""
 SIDE_BINS = 0.7
 """Weight of the two bins beside a bin in its sum of votes."""
-MOST_VOTE_ROUNDS = 64
+MAX_VOTE_ROUNDS = 64
 """Distance from all known pixels, in pixels, beyond which pixels are filled from the background side."""
-MOST_PIECE_PIXELS = 1 << 12
+MAX_VOTED_PIXELS_AT_ONCE = 1 << 12
 
 
 def fill_disparity_by_color(photo: FloatImage, values: FloatImage) -> FloatImage:
@@ -50,10 +50,10 @@ def fill_disparity_by_color(photo: FloatImage, values: FloatImage) -> FloatImage
     """
     filled, colors = np.array(values, np.float32, order="C"), np.ascontiguousarray(photo, np.float32)
     pixels = _beside_known(filled)
-    for _ in range(MOST_VOTE_ROUNDS):
+    for _ in range(MAX_VOTE_ROUNDS):
         if not len(pixels):
             break
-        parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
+        parts = [pixels[part] for part in pieces_of(len(pixels), MAX_VOTED_PIXELS_AT_ONCE)]
         votes = in_pieces(lambda part: _vote(colors, filled, part), parts, tiling.THREADS)
         filled.reshape(-1)[pixels] = np.concatenate(votes)
         pixels = _unknown_around(filled, pixels)

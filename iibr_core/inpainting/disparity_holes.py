@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.nearest_known import LINES, MOST_PIECE_PIXELS, nearest_known
+from iibr_core.inpainting.nearest_known import LINES, MAX_HOLE_PIXELS_AT_ONCE, nearest_known
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import in_pieces, pieces_of
 from iibr_core.types import FloatImage
@@ -38,7 +38,7 @@ def fill_disparity_holes(values: FloatImage) -> FloatImage:
     if unknown.all():
         raise ValueError("no known value to fill from")
     pixels, _, known = nearest_known(unknown, tiling.THREADS, 2 * LINES)
-    parts = pieces_of(len(pixels), MOST_PIECE_PIXELS)
+    parts = pieces_of(len(pixels), MAX_HOLE_PIXELS_AT_ONCE)
     means = in_pieces(lambda part: _farther_sides(filled, pixels[part], known[part]), parts, tiling.THREADS)
     np.put(filled, pixels, np.concatenate(means))
     # Pixels without a known value on any line are still unknown.

@@ -19,7 +19,7 @@ DIRECTIONS = np.array(
 """Steps (right, down)."""
 LINES = 4
 """Number of lines through a pixel, whose two directions come first in DIRECTIONS."""
-MOST_PIECE_PIXELS = 1 << 15
+MAX_HOLE_PIXELS_AT_ONCE = 1 << 15
 """Largest number of hole pixels that are filled between two checks for cancellation."""
 
 

@@ -46,7 +46,7 @@ PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
 FEATURES = PROFILE + 2 * len(PROFILE_PX) + 2
 """Number of features. The last two are 0: a multiple of four suits the arithmetic."""
 MAX_PX = 1e4
-MIN_VOTE = 0.004
+MIN_HYPOTHESIS_WEIGHT = 0.004
 """Weight below which a hypothesis changes no colour by a visible step."""
 SAME_COLOR = 1e-5
 """Largest difference of colours that need no mean: so a flat scene's views are the photo to the bit."""
@@ -382,7 +382,7 @@ def _blend(rays, offsets, found, weights, colors):
         first_r = first_g = first_b = 0.0
         for a in range(np.int64(found.number[n])):
             w = weights[n, a]
-            if not w > MIN_VOTE:
+            if not w > MIN_HYPOTHESIS_WEIGHT:
                 continue
             # Each hypothesis votes with the colour that its disparity leads to (paper, section 3.2).
             d, k = found.disparity[n, a], np.int64(found.source[n, a])

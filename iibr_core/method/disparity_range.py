@@ -11,16 +11,16 @@ import numpy as np
 
 from iibr_core.types import FloatImage
 
-LEAST_SHARE_PERCENT = 0.02
+MIN_SHARE_PERCENT = 0.02
 """Share of the picture, in percent, below which wild values do not set the range."""
 NOISE_OF_SECOND_DIFFERENCE = 1.652
 """Median of |a - 2b + c| over the deviation of independent Gaussian noise in a, b and c."""
-LEAST_OVER_NOISE = 4.0
+MIN_RANGE_DEVIATIONS = 4.0
 """A range of less than so many deviations of the noise is noise itself."""
-LEAST_OVER_VALUE = 1e-4
+MIN_RELATIVE_RANGE = 1e-4
 """A range below this share of the disparities it is found at lies beyond what maps state."""
 
-MOST_STEP = 1 / 30
+MAX_ROUNDING_STEP = 1 / 30
 """Largest step of rounding as a share of the range, that of five bits: larger ones are edges."""
 
 
@@ -50,10 +50,10 @@ def measure_disparity_range(disparity: FloatImage) -> DisparityRange:
     middle = float(np.median(disparity[finite])) if finite.any() else 0.0
     if not finite.all():
         disparity = np.where(finite, disparity, np.float32(middle))
-    low = float(np.percentile(_of_squares(disparity, np.maximum), LEAST_SHARE_PERCENT))
-    high = float(np.percentile(_of_squares(disparity, np.minimum), 100 - LEAST_SHARE_PERCENT))
+    low = float(np.percentile(_of_squares(disparity, np.maximum), MIN_SHARE_PERCENT))
+    high = float(np.percentile(_of_squares(disparity, np.minimum), 100 - MIN_SHARE_PERCENT))
     noise = min(_noise(disparity), _noise(disparity.T))
-    if high - low <= max(LEAST_OVER_NOISE * noise, LEAST_OVER_VALUE * max(abs(low), abs(high))):
+    if high - low <= max(MIN_RANGE_DEVIATIONS * noise, MIN_RELATIVE_RANGE * max(abs(low), abs(high))):
         return DisparityRange(middle, middle, noise)
     return DisparityRange(low, high, noise)
 
@@ -66,9 +66,9 @@ def rounding_step(disparity: FloatImage) -> float:
     """
     steps = np.concatenate([np.abs(np.diff(disparity, axis=axis)).ravel() for axis in (0, 1)])
     range_ = measure_disparity_range(disparity).range
-    steps = steps[steps > LEAST_OVER_VALUE * range_]
+    steps = steps[steps > MIN_RELATIVE_RANGE * range_]
     step = float(np.median(steps)) if steps.size else 0.0
-    return step if step <= MOST_STEP * range_ else 0.0
+    return step if step <= MAX_ROUNDING_STEP * range_ else 0.0
 
 
 def _of_squares(values: FloatImage, extreme: np.ufunc) -> FloatImage:

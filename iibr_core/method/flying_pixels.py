@@ -34,7 +34,7 @@ TEARING_GAP_PX = 2.0
 """Step of the photo that tears rays off, in px in the outermost view. With 1 px, exact maps lose 0.04 dB: thin things
 disappear.
 """
-CALM = 1e6
+UNREACHED_DETAIL = 1e6
 """Detail that no pixel of a view exceeds."""
 
 
@@ -57,8 +57,8 @@ def without_flying_pixels(
 ) -> Colors:
     """Return the colours (H, W, 3) of a view, sRGB-encoded, as floats or as they are stored, without flying pixels.
 
-    disparity, inpainted (H, W): of the view. detail: `measure_detail` of the photo with its margins, CALM where no ray
-    is torn off. threads: None for all cores.
+    disparity, inpainted (H, W): of the view. detail: `measure_detail` of the photo with its margins, UNREACHED_DETAIL
+    where no ray is torn off. threads: None for all cores.
     """
     # Kernels know no half precision.
     shown = colors.astype(np.float32) if colors.dtype == np.float16 else colors
@@ -104,7 +104,7 @@ def _replace_flying(colors, white, disparity, inpainted, detail, to_photo, rows,
         for x in range(disparity.shape[1]):
             v, u = y + disparity[y, x] * t + top, x + disparity[y, x] * s + left
             v, u = min(max(v, 0.0), lowest), min(max(u, 0.0), rightmost)
-            if inpainted[y, x] or detail[nearest_pixel(v), nearest_pixel(u)] >= CALM:
+            if inpainted[y, x] or detail[nearest_pixel(v), nearest_pixel(u)] >= UNREACHED_DETAIL:
                 continue
             red, green, blue = _median(colors, y, x, 0), _median(colors, y, x, 1), _median(colors, y, x, 2)
             stands_out = max(abs(colors[y, x, 0] - red), abs(colors[y, x, 1] - green), abs(colors[y, x, 2] - blue))

@@ -24,7 +24,7 @@ from iibr_core.types import FloatImage
 
 KEYS_A = np.float32(-0.75)
 """The sharper of the usual cubic kernels; it scored as well as longer ones on held-out light fields."""
-SOLE = 1 - 1e-6
+MIN_SOLE_SHARE = 1 - 1e-6
 """Share of the weights from which on a candidate is the only one."""
 MIN_TAP_WEIGHT = 0.3
 """Cubic weight on the candidate's surface below which its nearest pixel is taken instead."""
@@ -271,12 +271,12 @@ def _look_up_others(rays, offsets, candidates, weights, wanted, first_y, first_x
             source[row, x] = candidate_source[heavy, row, x]
             if not wanted[row, x]:
                 continue
-            sole = weights[heavy, row, x] >= SOLE * total
+            sole = weights[heavy, row, x] >= MIN_SOLE_SHARE * total
             sum_r = sum_g = sum_b = 0.0
             # Colours: the sum of w_k c_k over w_k > 0 (the paper's equation 1).
             for k in range(used):
                 w = weights[k, row, x] / total
-                if not w > 1.0 - SOLE:
+                if not w > 1.0 - MIN_SOLE_SHARE:
                     continue
                 # Backward warp along the candidate's own slope, held at the border.
                 d = candidate_disparity[k, row, x]

@@ -24,7 +24,7 @@ MATTING_PX = 5
 """Distance within which the colours of both surfaces are taken, in pixels."""
 MATTING_NEARNESS = nearness(MATTING_PX, 2.5)
 """Weights (2 MATTING_PX + 1, 2 MATTING_PX + 1) of the pixels there."""
-EDGE_BAND_TRUST = 0.001
+EDGE_BAND_WEIGHT = 0.001
 """Weight of pixels beside a depth edge, which may be mixed themselves; they count where there are no others."""
 COLOR_VARIANCE = 2e-5
 """Variance that is added to that of colours in linear light, for rounding, as a share of 1 plus theirs."""
@@ -153,7 +153,7 @@ def _color_statistics(colors, disparity, is_edge_band, pixel, foreground, edge_s
                 continue
             surface = 1 if to_foreground < to_own else 0
             weight = MATTING_NEARNESS[v - y + MATTING_PX, u - x + MATTING_PX] * (
-                EDGE_BAND_TRUST if is_edge_band[v, u] else 1.0
+                EDGE_BAND_WEIGHT if is_edge_band[v, u] else 1.0
             )
             weights[surface] += weight
             for c in range(3):

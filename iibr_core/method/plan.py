@@ -34,7 +34,7 @@ quarter of the views costs a third of a decibel.
 MAX_VIEWS_A_SIDE = 9
 STILL_PX = 0.5
 """Parallax across the whole grid that cannot be seen, in pixels: the scene is flat."""
-EDGE_PX = 1.5
+MIN_PLANNED_EDGE_PX = 1.5
 """Parallax between neighbouring pixels in the outermost view from which on they are two surfaces, in pixels."""
 EDGE_REACH_PX = 3
 """Distance of a pixel from a depth edge that counts as near, in pixels."""
@@ -42,7 +42,7 @@ MAX_COMFORTABLE = 2.0
 """Multiple of the parallax for viewing above which a disparity that is taken as given gets a note."""
 MAX_NOISE_PX = 1.0
 """Largest movement of a map's noise from the first view to the last: a range hardly above the noise moves less."""
-MOST_STRENGTH = 100.0
+MAX_DEPTH_STRENGTH = 100.0
 """Largest depth strength: parallax four times as wide as the picture."""
 
 
@@ -98,8 +98,8 @@ def plan_for_viewing(
     grid that the user asked for does not fit into memory.
     """
     wanted = overrides or PlanOverrides()
-    if not abs(wanted.depth_strength) <= MOST_STRENGTH:
-        raise InputError(f"depth strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
+    if not abs(wanted.depth_strength) <= MAX_DEPTH_STRENGTH:
+        raise InputError(f"depth strength {wanted.depth_strength:g}: give a number up to {MAX_DEPTH_STRENGTH:g}")
     span = measure_disparity_range(disparity.values)
     given = disparity.values
     disparity = replace(disparity, values=np.clip(given, span.low, span.high))
@@ -190,8 +190,8 @@ def _complete_plan(
 def _edge_share(moved_px: FloatImage) -> float:
     """Return the share of pixels near a depth edge, of a map (H, W) in px of parallax in the outermost view."""
     is_edge = np.zeros(moved_px.shape, np.bool_)
-    is_edge[:, 1:] = np.abs(np.diff(moved_px, axis=1)) > EDGE_PX
-    is_edge[1:] |= np.abs(np.diff(moved_px, axis=0)) > EDGE_PX
+    is_edge[:, 1:] = np.abs(np.diff(moved_px, axis=1)) > MIN_PLANNED_EDGE_PX
+    is_edge[1:] |= np.abs(np.diff(moved_px, axis=0)) > MIN_PLANNED_EDGE_PX
     for _ in range(EDGE_REACH_PX):
         near = is_edge.copy()
         near[1:] |= is_edge[:-1]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.outpainting import outpaint
-from iibr_core.method.flying_pixels import CALM, TEARING_GAP_PX, measure_detail
+from iibr_core.method.flying_pixels import TEARING_GAP_PX, UNREACHED_DETAIL, measure_detail
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.method.steep_surfaces import BELOW, RIGHT, is_joined, join_steep_rays
 from iibr_core.runtime.kernels import kernel
@@ -243,7 +243,7 @@ def rays_of_photo(
     rays, everywhere = RaySet(2 + more, size, farthest_views, margins, stages), np.ones(size, np.bool_)
     if stages.remove_flying_pixels:
         tears = near_steps(disparity, step_of(TEARING_GAP_PX, farthest_views))
-        rays.photo_detail = np.where(tears, measure_detail(colors), np.float32(CALM))
+        rays.photo_detail = np.where(tears, measure_detail(colors), np.float32(UNREACHED_DETAIL))
     if not stages.split_mixed_pixels:
         rays.add(centre, colors, disparity, everywhere)
         return rays

@@ -15,7 +15,7 @@ from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.work import in_this_job, raise_if_stopped
 from iibr_core.types import ImageSize
 
-MOST_BAND_PIXELS = 1 << 17
+MAX_PIXELS_AT_ONCE = 1 << 17
 """Largest number of pixels in a band: a cancelled job stops within some 30 ms."""
 THREADS = core_count()
 
@@ -53,13 +53,13 @@ def in_bands(
 ) -> list[Result]:
     """Return the results of work(first, last) on all rows [first, last) of an image (height, width), band by band.
 
-    threads: number of bands side by side, all cores by default. most_pixels: of a band, MOST_BAND_PIXELS by default.
+    threads: number of bands side by side, all cores by default. most_pixels: of a band, MAX_PIXELS_AT_ONCE by default.
     Raises Cancelled once the job is stopped.
     """
     height, width = size
     threads = threads or THREADS
     # Short enough to stop soon, and at least one band for each thread.
-    rows = max(min((most_pixels or MOST_BAND_PIXELS) // max(width, 1), -(-height // threads)), 1)
+    rows = max(min((most_pixels or MAX_PIXELS_AT_ONCE) // max(width, 1), -(-height // threads)), 1)
     firsts = range(0, height, rows)
     return in_pieces(lambda first: work(first, min(first + rows, height)), firsts, threads)
 

@@ -23,7 +23,7 @@ from iibr_core.formats.light_fields.light_field_formats import is_view_file
 from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.light_field import ViewMaker, view_maker
-from iibr_core.method.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
+from iibr_core.method.plan import MAX_DEPTH_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
@@ -135,7 +135,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_
             measure_disparity_range(map_.values).range for map_ in (loaded.refined, loaded.disparity)
         )
         wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
-        depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
+        depth_strength = min(max(wanted, -MAX_DEPTH_STRENGTH), MAX_DEPTH_STRENGTH)
     overrides = PlanOverrides(source.grid, depth_strength, zero, source.inpaint)
     return plan_for_viewing(loaded.photo, loaded.disparity, overrides, keeps_views)
 

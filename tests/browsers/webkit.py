@@ -22,7 +22,7 @@ COMMANDS = {
     "DeleteSession": ("DELETE", ""),
 }
 """Method and path of the commands by name."""
-LEAST_WIDTH = 447
+MIN_WIDTH = 447
 """Smallest width of a window, CSS pixels."""
 GTK_SETTINGS = "[Settings]\ngtk-enable-animations=0\n"
 """Settings by which pages prefer reduced motion."""
@@ -32,8 +32,8 @@ class WebKitPage(WebDriverPage):
     """The page of a WebKitGTK."""
 
     def resize(self, width: int, height: int) -> None:
-        """Set the size of the page; its width is at least LEAST_WIDTH."""
-        width = max(width, LEAST_WIDTH)
+        """Set the size of the page; its width is at least MIN_WIDTH."""
+        width = max(width, MIN_WIDTH)
         across, down = self.evaluate("[outerWidth - innerWidth, outerHeight - innerHeight]")
         self.call("SetWindowRect", {"width": width + across, "height": height + down})
         self.wait_until(f"innerWidth === {width} && innerHeight === {height}")

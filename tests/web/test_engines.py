@@ -13,16 +13,16 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
 from tests.browsers.page import Page
 from tests.web.conftest import STILL, canvas, set_lens
-from tests.web.test_page import LEAST_PSNR_DB, LEAST_WITH_APERTURE_DB, SETTINGS, psnr, set_desktop_lens
+from tests.web.test_page import MIN_PSNR_DB, MIN_WITH_APERTURE_DB, SETTINGS, psnr, set_desktop_lens
 from viewer.display.offscreen import OffscreenScene
 
 SIZES = {"desk": (720, 480), "phone": (390, 844)}
 LENS = "['focus', 'aperture'].map(name => document.getElementById(name).valueAsNumber)"
 BOX = "(({ x, y, width, height }) => [x, y, width, height])(document.getElementById('view').getBoundingClientRect())"
 IS_STILL = "document.documentElement.dataset.state === 'still'"
-MOST_MOVED_DB = 40.0
+MAX_MOVED_DB = 40.0
 """Agreement of pictures from different viewpoints at most."""
-LEAST_SHOWN_DB = 45.0
+MIN_SHOWN_DB = 45.0
 """Agreement of the screen with the canvas, stretched to a fraction of a pixel: 50.8 dB were measured at least."""
 
 
@@ -59,8 +59,8 @@ def agreement(page: Page, desktop: OffscreenScene, setting: tuple[float, float, 
 
 def test_all_views_arrive_and_look_as_on_the_desktop(opened, desktop) -> None:
     pinhole, aperture = SETTINGS[1:3]
-    assert agreement(opened, desktop, pinhole) >= LEAST_PSNR_DB
-    assert agreement(opened, desktop, aperture) >= LEAST_WITH_APERTURE_DB
+    assert agreement(opened, desktop, pinhole) >= MIN_PSNR_DB
+    assert agreement(opened, desktop, aperture) >= MIN_WITH_APERTURE_DB
 
 
 def test_views_arrive_where_the_context_is_insecure(engine, site, page, desktop) -> None:
@@ -69,7 +69,7 @@ def test_views_arrive_where_the_context_is_insecure(engine, site, page, desktop)
     engine.resize(*SIZES["phone"])
     engine.open("http://name.test/scene.html")
     assert not engine.evaluate("isSecureContext")
-    assert agreement(engine, desktop, SETTINGS[1]) >= LEAST_PSNR_DB
+    assert agreement(engine, desktop, SETTINGS[1]) >= MIN_PSNR_DB
 
 
 def test_views_arrive_right_where_decoders_fail(engine, page, tmp_path, desktop) -> None:
@@ -80,7 +80,7 @@ def test_views_arrive_right_where_decoders_fail(engine, page, tmp_path, desktop)
     (tmp_path / "scene.html").write_text(text, "utf-8")
     engine.resize(*SIZES["phone"])
     engine.open((tmp_path / "scene.html").as_uri())
-    assert agreement(engine, desktop, SETTINGS[1]) >= LEAST_PSNR_DB
+    assert agreement(engine, desktop, SETTINGS[1]) >= MIN_PSNR_DB
 
 
 def test_drags_keys_and_taps_change_the_picture(opened) -> None:
@@ -89,7 +89,7 @@ def test_drags_keys_and_taps_change_the_picture(opened) -> None:
     for change in (lambda: opened.drag((x, y), (0.9 * x, y), (0.5 * x, y)), lambda: opened.press("ArrowRight", 4)):
         change()
         opened.wait_until(IS_STILL)
-        assert psnr(canvas(opened), first) < MOST_MOVED_DB
+        assert psnr(canvas(opened), first) < MAX_MOVED_DB
         opened.press("r")
         opened.wait_until(IS_STILL)
         assert (canvas(opened) == first).all()
@@ -107,7 +107,7 @@ def test_the_canvas_is_what_the_screen_shows_and_what_is_saved(opened) -> None:
     shown = picture(opened.screenshot())[top : top + rows, left : left + columns]
     stretched = np.asarray(Image.fromarray(drawn).resize((columns, rows), Image.Resampling.BILINEAR))
     middle = slice(rows // 4, rows // 2)
-    assert psnr(shown[middle], stretched[middle]) >= LEAST_SHOWN_DB, "between the words and the bar"
+    assert psnr(shown[middle], stretched[middle]) >= MIN_SHOWN_DB, "between the words and the bar"
     saved = opened.downloads / "scene.png"
     saved.unlink(missing_ok=True)
     opened.press("s")

@@ -37,9 +37,9 @@ DISTANCE_M, SIDE_M, EYES_M, HEAD_M = 1.5, 1.2, 0.063, 0.1
 """Numbers of `web/headset.js`."""
 STEP_M = (EYES_M + HEAD_M) / (GRID.columns - 1)
 FOCUS, DEPTH_STRENGTH = 0.5, 3.0
-LEAST_PSNR_DB = 36.0
+MIN_PSNR_DB = 36.0
 """Half a level of compression and half a pixel of resampling; 37.6 dB were measured at least."""
-MOST_OFF_PX = 0.7
+MAX_OFF_PX = 0.7
 """Largest distance of the red square from its true place: 0.47 px were measured at most."""
 
 Matrix = NDArray[np.float64]
@@ -195,9 +195,9 @@ def test_twenty_poses_show_each_eye_the_desktops_picture_with_true_depth(worn, s
                 wanted = desktop_picture(viewer, pose.eye(side))
                 inside = seen_through(np.full_like(wanted, 255), pose, side) == 255
                 error = (drawn.astype(float) - seen_through(wanted, pose, side))[inside]
-                assert 10 * np.log10(255**2 / np.mean(error**2)) >= LEAST_PSNR_DB, (pose, side)
+                assert 10 * np.log10(255**2 / np.mean(error**2)) >= MIN_PSNR_DB, (pose, side)
                 off_px = red_middle(drawn) - red_middle(painted(pose.pixels(corners, side)))
-                assert np.abs(off_px).max() <= MOST_OFF_PX, (pose, side)
+                assert np.abs(off_px).max() <= MAX_OFF_PX, (pose, side)
 
 
 def lens(tab: Tab) -> list[float]:

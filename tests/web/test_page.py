@@ -22,13 +22,13 @@ from viewer.model.action import do
 
 SETTINGS = ((0.0, 0.0, 0.0, 0.0), (0.5, -0.25, 0.0, 0.0), (-0.5, 0.25, 0.4, 1.2), (0.5, 0.5, -0.2, 3.0))
 """s, t, focus, aperture."""
-LEAST_PSNR_OF_HALVES_DB = 55.0
+MIN_PSNR_OF_HALVES_DB = 55.0
 """Agreement of sums in half floats with those in floats: 61.8 dB were measured at least."""
-LEAST_PSNR_DB, LEAST_WITH_APERTURE_DB = 46.0, 48.0
+MIN_PSNR_DB, MIN_WITH_APERTURE_DB = 46.0, 48.0
 """The page is no nearer to the desktop than its compressed views are; an aperture averages over them."""
-LEAST_PSNR_OF_NOISE_DB = 38.0
+MIN_PSNR_OF_NOISE_DB = 38.0
 """The same for a page of fine noise: 40.3 dB were measured at least."""
-BLOCK_PX, MOST_IN_BLOCK = 8, 8.0
+BLOCK_PX, MAX_IN_BLOCK = 8, 8.0
 """A seam would change the whole of some block, of 255; compression changes each by less."""
 
 
@@ -49,7 +49,7 @@ def test_the_canvas_is_the_desktops_picture(shown, scene) -> None:
             wait_until_still(shown)
             drawn = canvas(shown)
             assert drawn.shape == (HEIGHT, WIDTH, 3)
-            least = LEAST_WITH_APERTURE_DB if aperture else LEAST_PSNR_DB
+            least = MIN_WITH_APERTURE_DB if aperture else MIN_PSNR_DB
             assert psnr(drawn, viewer.picture()) >= least, (s, t, focus, aperture)
 
 
@@ -65,7 +65,7 @@ def test_rows_nearer_together_than_columns_are_drawn_as_on_the_desktop(tab, tmp_
             set_desktop_lens(viewer, 0.5, t, focus, aperture)
             set_lens(tab, 0.5, t, focus, aperture)
             wait_until_still(tab)
-            assert psnr(canvas(tab), viewer.picture()) >= LEAST_PSNR_OF_NOISE_DB
+            assert psnr(canvas(tab), viewer.picture()) >= MIN_PSNR_OF_NOISE_DB
     tab.resize(5 * SIZE, 640)  # the picture lies above the bar
     # The square reaches from 30 to 70 in the first row's views, from 26 to 66 in the last row's.
     for t, y, disparity in ((-2, 32, SQUARE_PX), (-2, 73, WALL_PX), (2, 23, WALL_PX), (2, 63, SQUARE_PX)):
@@ -106,7 +106,7 @@ def test_half_floats_suffice(tab, tmp_path) -> None:
             pictures.append(canvas(tab))
     count = len(SETTINGS)
     for setting, halves, floats in zip(SETTINGS, pictures[:count], pictures[count:], strict=True):
-        assert psnr(floats, halves) >= LEAST_PSNR_OF_HALVES_DB, setting
+        assert psnr(floats, halves) >= MIN_PSNR_OF_HALVES_DB, setting
     assert any((halves != floats).any() for halves, floats in zip(pictures[:count], pictures[count:], strict=True))
 
 
@@ -119,7 +119,7 @@ def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown, scene) -
             wait_until_still(shown)
             difference = np.abs(canvas(shown).astype(float) - viewer.picture()).mean(axis=2)
             blocks = difference.reshape(HEIGHT // BLOCK_PX, BLOCK_PX, WIDTH // BLOCK_PX, BLOCK_PX).mean(axis=(1, 3))
-            assert blocks.max() <= MOST_IN_BLOCK, s
+            assert blocks.max() <= MAX_IN_BLOCK, s
 
 
 def test_it_shows_in_a_frame_that_may_do_next_to_nothing(tab, page, tmp_path) -> None:
@@ -248,7 +248,7 @@ def test_a_stepped_video_shows_the_same_as_a_decoder(tab, shown, page) -> None:
     assert tab.evaluate("+document.documentElement.dataset.views") == 9
     set_lens(tab, *SETTINGS[1])
     wait_until_still(tab)
-    assert psnr(canvas(tab), decoded) >= LEAST_PSNR_OF_HALVES_DB
+    assert psnr(canvas(tab), decoded) >= MIN_PSNR_OF_HALVES_DB
 
 
 def test_frames_that_no_queue_announces_are_shown(tab, page) -> None:

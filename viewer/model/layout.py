@@ -46,7 +46,7 @@ NEAR_FIT = 1.02
 """Factor of the fitting size within which the zoom snaps to fit."""
 
 STRIP_UNITS_PER_VIEW = 9.0
-LEAST_STRIP, MOST_STRIP = 45.0, 130.0
+MIN_STRIP, MAX_STRIP = 45.0, 130.0
 """Limits of the thickness of EPI strips at usual size."""
 
 STRIP_GAP = 6.0
@@ -229,7 +229,7 @@ def layout_of(
 
 def _thickness(views: int, ui_scale: float) -> float:
     """Return the thickness of an EPI strip; 0 without views."""
-    return min(max(views * STRIP_UNITS_PER_VIEW, LEAST_STRIP), MOST_STRIP) * ui_scale if views else 0.0
+    return min(max(views * STRIP_UNITS_PER_VIEW, MIN_STRIP), MAX_STRIP) * ui_scale if views else 0.0
 
 
 def letterbox(room: Rect, picture_size: ScreenSize) -> Rect | None:

@@ -26,7 +26,7 @@ BAND_PX = 4
 """Largest number of pixels between a labelled pixel and a step; at this distance, colours should agree with the map."""
 SAMPLED_PX, SAMPLE_STEP = 8, 2
 """Distance in which every second pixel, in both directions, is a sample of its surface's colours, in pixels."""
-TRUST = np.append(np.geomspace(0.1, 1.0, BAND_PX + 1), 1.0).astype(np.float32)
+SAMPLE_WEIGHTS = np.append(np.geomspace(0.1, 1.0, BAND_PX + 1), 1.0).astype(np.float32)
 """Weights of samples by the pixels between them and a step: near ones are mixed, or on the wrong side."""
 MIN_FOREGROUND = 0.7
 """Least total weight of a foreground's samples: a thinner foreground keeps its pixels."""
@@ -34,7 +34,7 @@ LIKENESS = 0.5
 """Standard deviation of colours that are alike, in mean steps of colour in the band."""
 UNLIKELY, UNSEEN_WEIGHT = 0.03, 0.3
 """Likelihood of a colour that no sample has, and weight of that possibility; also the least share of map errors."""
-VOTE = 1.5
+NEIGHBOUR_WEIGHT = 1.5
 """Weight of a neighbour that looks alike, and of the map's log odds, in units of log likelihood of the colours. Colours
 are clear if they count more than a neighbour. With a smaller weight, thin wires are lost.
 """
@@ -81,7 +81,7 @@ def label_edges(colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool
     if not len(pixels):
         return values
     alike = LIKENESS * _mean_color_step(colors, pixels)
-    weigh = partial(_weigh_colors, colors, values, TRUST[distance], min_edge, alike)
+    weigh = partial(_weigh_colors, colors, values, SAMPLE_WEIGHTS[distance], min_edge, alike)
     flat, away, known = values.reshape(-1), distance.reshape(-1), ~unknown.reshape(-1)
     few = pixels[:: ceil(len(pixels) / (4 * PIECE_PIXELS))]
     other, evidence = _in_parts(weigh, few)
@@ -89,7 +89,7 @@ def label_edges(colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool
     if errors.max() <= MAX_EXACT_ERRORS:
         return values
     other, evidence = _in_parts(weigh, pixels)
-    odds = np.float32(VOTE) * np.log((1 - errors) / errors)
+    odds = np.float32(NEIGHBOUR_WEIGHT) * np.log((1 - errors) / errors)
     prior = np.where(known[pixels], odds[(flat[pixels] > other).astype(np.intp), away[pixels]], np.float32(0))
     drive = np.where(other == flat[pixels], np.float32(np.inf), evidence + prior)
     stays = _mean_field(colors, values, pixels, other, drive, alike) >= 0.5
@@ -133,7 +133,7 @@ def _measure_errors(
     Contradictions count beyond those inside surfaces and those of the mixed pixels of exact steps.
     """
     errors = np.full((2, BAND_PX + 1), UNLIKELY, np.float32)
-    is_clear = known & (np.abs(evidence) > VOTE)
+    is_clear = known & (np.abs(evidence) > NEIGHBOUR_WEIGHT)
     for side in range(2):
         misled = _contradicted(evidence[is_clear & (in_front == side) & (away == BAND_PX)])
         for k in range(BAND_PX + 1):
@@ -317,7 +317,7 @@ def _count_votes(colors, values, pixels, number, other, alike, drive, votes, fir
             k = number[v, u]
             stays = _side(values[v, u], value, other[n], half)
             leaves = _side(other[k], value, other[n], half) if k >= 0 else stays
-            weight = VOTE * _likeness(_squared_distance(colors[v, u], colors[y, x]), alike)
+            weight = NEIGHBOUR_WEIGHT * _likeness(_squared_distance(colors[v, u], colors[y, x]), alike)
             drive[n] += weight * leaves
             votes[n, j] = weight * (stays - leaves)
 

@@ -12,7 +12,7 @@ from iibr_core.depth.editing.edits import Stroke
 from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
 
-EDGE_PX = 2
+COMPARED_APART_PX = 2
 """Distance of the pixels that are compared: edges may be blurred, and gaps up to twice as wide are closed."""
 DEPTH_EDGE = 0.05
 """Step of disparity between surfaces, as a share of the map's range."""
@@ -42,8 +42,8 @@ def surface_at(
     for axis in (0, 1):
         contrast = _contrast(*(image.swapaxes(0, axis) for image in (photo, colors, depth)))
         turned = is_edge.swapaxes(0, axis)
-        turned[:-EDGE_PX] |= contrast > stroke.tolerance
-        turned[EDGE_PX:] |= contrast > stroke.tolerance
+        turned[:-COMPARED_APART_PX] |= contrast > stroke.tolerance
+        turned[COMPARED_APART_PX:] |= contrast > stroke.tolerance
         contrasts.append(contrast)
     queue = np.empty(surface.size, np.int32)
     row, column = _nearest_free(~is_edge, int(y * height), int(x * width))
@@ -55,19 +55,23 @@ def surface_at(
 
 
 def _contrast(photo: FloatImage, colors: FloatImage, depth: FloatImage) -> FloatImage:
-    """Return the contrast (H - EDGE_PX, W) between pixels in a column, above 1 between surfaces.
+    """Return the contrast (H - COMPARED_APART_PX, W) between pixels in a column, above 1 between surfaces.
 
     depth: in steps between surfaces.
     """
-    difference = photo[EDGE_PX:] - photo[:-EDGE_PX]
+    difference = photo[COMPARED_APART_PX:] - photo[:-COMPARED_APART_PX]
     contrast = np.sqrt(np.einsum("yxc,yxc->yx", difference, difference)) / np.float32(CONTOUR_CONTRAST)
-    contrast[np.maximum(colors[EDGE_PX:], colors[:-EDGE_PX]) <= 0] = 0  # texture
-    return np.asarray(np.maximum(contrast, np.abs(depth[EDGE_PX:] - depth[:-EDGE_PX])))
+    contrast[np.maximum(colors[COMPARED_APART_PX:], colors[:-COMPARED_APART_PX]) <= 0] = 0  # texture
+    return np.asarray(np.maximum(contrast, np.abs(depth[COMPARED_APART_PX:] - depth[:-COMPARED_APART_PX])))
 
 
 def _nearest_free(is_free: Mask, row: int, column: int) -> tuple[int, int]:
     """Return the free pixel nearest to a pixel, as far as edges are wide; the pixel itself without any."""
-    top, left, reach = max(row - EDGE_PX - 1, 0), max(column - EDGE_PX - 1, 0), EDGE_PX + 2
+    top, left, reach = (
+        max(row - COMPARED_APART_PX - 1, 0),
+        max(column - COMPARED_APART_PX - 1, 0),
+        COMPARED_APART_PX + 2,
+    )
     places = np.argwhere(is_free[top : row + reach, left : column + reach]) + np.array((top, left))
     if not len(places):
         return row, column
@@ -79,10 +83,10 @@ def _grow(surface: Mask, is_edge: Mask, contrasts: list[FloatImage]) -> None:
     """Add the pixels of edges that differ less from the surface than from the other side. contrasts: by axis."""
     likes = []
     for axis in (0, 1):
-        padded, height = np.pad(contrasts[axis], [(EDGE_PX, EDGE_PX), (0, 0)]), surface.shape[axis]
-        above, below = padded[:height], padded[EDGE_PX : height + EDGE_PX]
+        padded, height = np.pad(contrasts[axis], [(COMPARED_APART_PX, COMPARED_APART_PX), (0, 0)]), surface.shape[axis]
+        above, below = padded[:height], padded[COMPARED_APART_PX : height + COMPARED_APART_PX]
         likes.append((above <= below, below <= above))
-    for _ in range(EDGE_PX + 1):
+    for _ in range(COMPARED_APART_PX + 1):
         grown = surface.copy()
         for axis, (is_like_above, is_like_below) in enumerate(likes):
             before, after = surface.swapaxes(0, axis), grown.swapaxes(0, axis)

@@ -37,7 +37,7 @@ WINDOW_RADIUS_PX, WINDOW_SMOOTHNESS = 2, 1e-5
 """Guided filter that averages costs."""
 SAME_LINE = 0.3
 """Largest distance of views of one row or column along it, in the widest distances of neighbouring views."""
-MAX_DIFFERENCE = 0.03
+MAX_TEXTURE_DIFFERENCE = 0.03
 """Difference of texture (1 = white) that costs most: larger ones cost the same."""
 HIDDEN_FACTOR = 1.5
 """Factor by which one half of the views must match better than all, so that the other half counts as hidden."""
@@ -159,7 +159,7 @@ def _match(textures, offsets, disparity, parts):
     All pixels of a row shift alike, so that one instruction compares several of them.
     """
     views, height, width = textures.shape
-    most = np.float32(MAX_DIFFERENCE**2)
+    most = np.float32(MAX_TEXTURE_DIFFERENCE**2)
     min_seen = max(np.float32(MIN_SEEN_SHARE * (views - 1)), np.float32(1))
     sums, counts = np.empty((5, width), np.float32), np.empty((5, width), np.float32)
     costs = np.empty(width, np.float32)
@@ -209,4 +209,4 @@ def _store_costs(parts, costs):
         for x in range(costs.shape[1]):
             half = min(min(parts[0, y, x], parts[1, y, x]), min(parts[2, y, x], parts[3, y, x]))
             square = max(min(parts[4, y, x], max(HIDDEN_FACTOR * half, HIDDEN_DIFFERENCE**2)), np.float32(0))
-            costs[y, x] = np.uint8(255 * min(np.sqrt(square) / np.float32(MAX_DIFFERENCE), np.float32(1)))
+            costs[y, x] = np.uint8(255 * min(np.sqrt(square) / np.float32(MAX_TEXTURE_DIFFERENCE), np.float32(1)))

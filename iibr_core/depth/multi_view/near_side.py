@@ -11,7 +11,7 @@ from iibr_core.types import FloatImage, ViewOffset
 
 MIN_HIDING_PX = 1.5
 """Least shift between two surfaces in a view in which one of them hides the other."""
-MAX_DIFFERENCE = 0.1
+MAX_LUMA_DIFFERENCE = 0.1
 """Difference of luma that counts most: larger ones count the same."""
 MIN_SLOPE = 0.01
 """Least step of luma from pixel to pixel of a place whose disparity is known."""
@@ -37,7 +37,7 @@ def nearness_ratio(lumas: Sequence[FloatImage], offsets: Sequence[ViewOffset], v
             continue
         places, is_inside = _places(values, t, s)
         difference = luma.ravel()[places] - lumas[0]
-        away = np.minimum(np.abs(difference - np.median(difference[is_inside])), MAX_DIFFERENCE)
+        away = np.minimum(np.abs(difference - np.median(difference[is_inside])), MAX_LUMA_DIFFERENCE)
         margin = MIN_HIDING_PX / max(abs(t), abs(s))
         total += int(is_inside.sum())
         for side, sign in enumerate((1, -1)):

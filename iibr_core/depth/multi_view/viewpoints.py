@@ -32,7 +32,7 @@ MIN_CORNER = 5e-5
 """Smallest gradient across the weaker direction (mean square of luma a pixel) of a point that can be found again."""
 MAX_SECOND = 0.7
 """Largest ratio of the least difference to that of another place, for a place that is found without doubt."""
-MAX_DIFFERENCE = 0.06
+MAX_PATCH_DIFFERENCE = 0.06
 """Largest root mean square difference of a patch and its place in another view."""
 MIN_SHIFT_PX, MIN_MOVING = 0.1, 0.05
 """Least shift of a point that moves, and the smallest share of such points where views have any parallax."""
@@ -138,7 +138,7 @@ def _find_points(reference, other, points, reach, found):
     """Fill found with the shift (down, across) of each point, to a part of a pixel; NaN where it is in doubt."""
     radius, (height, width) = PATCH_RADIUS_PX, reference.shape
     side = 2 * radius + 1
-    worst, outside = np.float32(side**2 * MAX_DIFFERENCE**2), np.float32(side**2)
+    worst, outside = np.float32(side**2 * MAX_PATCH_DIFFERENCE**2), np.float32(side**2)
     costs = np.empty((2 * reach + 1, 2 * reach + 1), np.float32)
     for k in range(len(points)):
         top, left = points[k, 0] - radius, points[k, 1] - radius

@@ -115,7 +115,7 @@ def test_bands_do_not_show(monkeypatch):
     pixels, inverse_depth = square_scene()
     target = camera(40, 48, place=(0.1, 0.05, 0.1), turned=about(2, 20.0))
     whole = view_of(pixels, inverse_depth, target)
-    monkeypatch.setattr(free_view, "MOST_BAND_PIXELS", 48 * SAMPLES**2 * 3)
+    monkeypatch.setattr(free_view, "MAX_PIXELS_AT_ONCE", 48 * SAMPLES**2 * 3)
     banded = view_of(pixels, inverse_depth, target)
     np.testing.assert_array_equal(whole.colors, banded.colors)
 

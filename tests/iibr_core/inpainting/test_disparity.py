@@ -109,7 +109,7 @@ def test_without_colours_that_tell_the_nearest_decide():
 
 
 def test_what_is_far_from_all_that_is_known_comes_from_the_background(monkeypatch):
-    monkeypatch.setattr(disparity_by_color, "MOST_VOTE_ROUNDS", 2)
+    monkeypatch.setattr(disparity_by_color, "MAX_VOTE_ROUNDS", 2)
     values = np.full((9, 40), np.nan, np.float32)
     values[:, 0], values[:, -1] = 3.0, 1.0
     filled = fill_disparity_by_color(np.full((9, 40, 3), 0.5, np.float32), values)

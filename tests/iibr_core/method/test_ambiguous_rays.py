@@ -5,7 +5,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.method.ambiguous_rays import (
     FAINT_WEIGHT,
     MIN_COLOR_CHANGE,
-    MIN_VOTE,
+    MIN_HYPOTHESIS_WEIGHT,
     blend,
     find_ambiguous_rays,
     hypothesis_colors,
@@ -98,7 +98,7 @@ def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
     weights = random.uniform(0.01, 1, ambiguous.mask.shape).astype(np.float32) * ambiguous.mask
     weights /= weights.sum(axis=1, keepdims=True)
     colors, disparities, source = blend(rays, ambiguous, weights)
-    kept = np.where(weights > MIN_VOTE, weights, 0)
+    kept = np.where(weights > MIN_HYPOTHESIS_WEIGHT, weights, 0)
     light = (kept[..., None] * linear_from_srgb(hypothesis_colors(rays, ambiguous))).sum(axis=1)
     assert colors == pytest.approx(srgb_from_linear(light / kept.sum(axis=1, keepdims=True)), abs=1e-4)
     at = np.arange(len(weights)), weights.argmax(axis=1)

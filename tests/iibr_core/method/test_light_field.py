@@ -40,7 +40,7 @@ def test_order_and_bands_do_not_change_a_pixel(monkeypatch):
     photo, disparity = square_before_wall()
     reference = views_of(photo, disparity, 5)
     other_order = views_of(photo, disparity, 5, nearest_to=lambda: ViewOffset(2.0, -2.0))
-    monkeypatch.setattr(tiling, "MOST_BAND_PIXELS", 7 * 80)
+    monkeypatch.setattr(tiling, "MAX_PIXELS_AT_ONCE", 7 * 80)
     monkeypatch.setattr(tiling, "THREADS", 3)
     small_bands = views_of(photo, disparity, 5)
     for other in (other_order, small_bands):

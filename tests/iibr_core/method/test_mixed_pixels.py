@@ -4,7 +4,13 @@ from scipy import ndimage
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.method import mixed_pixels
-from iibr_core.method.flying_pixels import CALM, STANDS_OUT, STANDS_OUT_FACTOR, measure_detail, without_flying_pixels
+from iibr_core.method.flying_pixels import (
+    STANDS_OUT,
+    STANDS_OUT_FACTOR,
+    UNREACHED_DETAIL,
+    measure_detail,
+    without_flying_pixels,
+)
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer, View
@@ -83,7 +89,7 @@ def obvious_split(colors, disparity, y, x):
     around = (disparity[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2] for j, i in np.ndindex(disparity.shape))
     steps = [(abs(values - here) > 0.5).any() for values, here in zip(around, disparity.flat)]
     is_edge_band = np.reshape(steps, disparity.shape)
-    weight = np.exp(-((v - y) ** 2 + (u - x) ** 2) / 12.5) * np.where(is_edge_band, mixed_pixels.EDGE_BAND_TRUST, 1.0)
+    weight = np.exp(-((v - y) ** 2 + (u - x) ** 2) / 12.5) * np.where(is_edge_band, mixed_pixels.EDGE_BAND_WEIGHT, 1.0)
     light = linear_from_srgb(colors).astype(np.float64)
     means, spreads = [], []
     for surface in (behind, in_front):
@@ -192,7 +198,7 @@ def replaced_slowly(colors: np.ndarray, view: View, detail: np.ndarray) -> np.nd
     for y, x in np.argwhere(~view.inpainted):
         v, u = np.clip(np.array([y, x]) + view.disparity[y, x] * np.array(OFFSET), 0, last)
         own = ndimage.map_coordinates(detail.astype(float), [[v], [u]], order=1, mode="nearest")[0]
-        is_torn = detail[int(v + 0.5), int(u + 0.5)] < CALM
+        is_torn = detail[int(v + 0.5), int(u + 0.5)] < UNREACHED_DETAIL
         if is_torn and np.abs(colors[y, x] - medians[y, x]).max() > STANDS_OUT + STANDS_OUT_FACTOR * own:
             replaced[y, x] = medians[y, x]
     return replaced

@@ -38,7 +38,7 @@ MAPS = {
     "exact": lambda photo, d, rng: d,
     "degraded": lambda photo, d, rng: refine(photo, degrade(d, rng, RADIUS)),
 }
-LEAST_GAIN = {
+MIN_GAIN = {
     ("exact", "all"): 0.5,
     ("exact", "covered in part"): 0.2,
     ("exact", "beside what is inpainted"): 0.6,
@@ -93,9 +93,9 @@ def gains():
     return gains
 
 
-@pytest.mark.parametrize("case", LEAST_GAIN, ids=", ".join)
+@pytest.mark.parametrize("case", MIN_GAIN, ids=", ".join)
 def test_the_transformer_gains_on_held_out_scenes(gains, case):
-    assert gains[case] > LEAST_GAIN[case]
+    assert gains[case] > MIN_GAIN[case]
 
 
 def random_ambiguous(rays=200, seed=0):

@@ -57,9 +57,9 @@ STAGES = {
 @pytest.fixture
 def narrow(monkeypatch):
     """A few rows a band, more threads than usual."""
-    monkeypatch.setattr(tiling, "MOST_BAND_PIXELS", 7 * SIZE[1])
+    monkeypatch.setattr(tiling, "MAX_PIXELS_AT_ONCE", 7 * SIZE[1])
     monkeypatch.setattr(tiling, "THREADS", 3)
-    monkeypatch.setattr(background, "MOST_PIECE_PIXELS", 100)
+    monkeypatch.setattr(background, "MAX_HOLE_PIXELS_AT_ONCE", 100)
 
 
 @pytest.mark.parametrize("name", STAGES)

@@ -12,7 +12,7 @@ from iibr_core.formats.images.photo import focal_px_from_fov, read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.gloss.settings import Gloss, GlossSurface
-from iibr_core.method.plan import MOST_STRENGTH
+from iibr_core.method.plan import MAX_DEPTH_STRENGTH
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.large_photo import load_large
 from iibr_core.scenes.opening import results_of, scene_of_photo, sketch_of
@@ -128,7 +128,7 @@ def test_edits_change_no_parallax_elsewhere(static, strength) -> None:
     assert apply_depth_settings(edited, edited.depth_settings) is edited
     back = apply_depth_settings(edited, DepthSettings(False))
     np.testing.assert_array_equal(back.disparity.values, loaded.disparity.values)
-    assert make_plan(source, edited, MOST_STRENGTH).disparity_scale > 0
+    assert make_plan(source, edited, MAX_DEPTH_STRENGTH).disparity_scale > 0
 
 
 def test_gloss_maps_are_made_once_for_a_surface(photo_path) -> None:

@@ -20,7 +20,7 @@ from viewer.display.offscreen import OffscreenScene
 
 SIZE = ScreenSize(300, 200)
 SMALLER = 120 * 80
-LEAST_DB = 40.0
+MIN_DB = 40.0
 LENSES = {
     "pinhole": Optics(ViewOffset(0.6, -0.4)),
     "wide, beside the middle": Optics(ViewOffset(-0.5, 0.3), focus_disparity=-0.5, aperture_diameter=2.5),
@@ -74,7 +74,7 @@ def test_a_picture_at_the_photos_own_size_is_that_of_views_so_large(
     optics = LENSES[name]
     full, expected = (picture(viewer, optics)[8:-8, 8:-8] for viewer in viewers)
     assert [viewer.draws_own_pixels(SIZE) for viewer in viewers] == [True, False]
-    assert bounded_psnr(full, expected) > LEAST_DB
+    assert bounded_psnr(full, expected) > MIN_DB
 
 
 def test_tiles_are_as_sharp_as_the_whole(
@@ -84,7 +84,7 @@ def test_tiles_are_as_sharp_as_the_whole(
     at_once = picture(viewers[0], optics)
     monkeypatch.setattr("iibr_core.exports.full_drawing.TILE_PX", 64)
     tiled = picture(viewers[0], optics)
-    assert bounded_psnr(tiled, at_once) > LEAST_DB
+    assert bounded_psnr(tiled, at_once) > MIN_DB
     steps = [np.abs(np.diff(image, axis=1)).mean(axis=(0, 2)) for image in (tiled, at_once)]
     for left in range(0, SIZE.width - 64, 64):
         tile = slice(left, left + 63)

@@ -20,7 +20,7 @@ from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
 from viewer.gpu.refocus.picture_renderer import Renderer
 
-LEAST_DB = {"shelf": 43.4, "fence": 40.4}
+MIN_DB = {"shelf": 43.4, "fence": 40.4}
 Field = Mapping[tuple[int, int], ViewUpdate]
 
 
@@ -50,7 +50,7 @@ def test_a_photo_refocuses_as_the_lens_does_and_true_views_are_the_upper_referen
     renderer: Renderer, scene: LensScene, field: Field
 ) -> None:
     generated_db = drawn_db(renderer, scene, field)
-    assert generated_db > LEAST_DB[scene.scene.name]
+    assert generated_db > MIN_DB[scene.scene.name]
     assert generated_db > scene.lens_db(scene.photo.pixels) + 8
     views = {
         (row, column): ViewUpdate(row, column, stored_from_encoded(pixels, False), None)

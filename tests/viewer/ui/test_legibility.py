@@ -30,8 +30,8 @@ from viewer.model.state.prompts import ExportPrompt, JobProgress, PalettePrompt,
 from viewer.ui.style import Color, Look, apply_style, palette_of
 
 WINDOW, SMALL_WINDOW = ScreenSize(1280, 800), ScreenSize(400, 300)
-LEAST_CONTRAST = 4.5
-LEAST_HOVER_CONTRAST = 1.5
+MIN_CONTRAST = 4.5
+MIN_HOVER_CONTRAST = 1.5
 SCALES = (0.6, 1.0, 2.0)
 SLACK_PX = 1.0
 WORDS_INSIDE = ("button", "small_button", "slider_float", "slider_int", "begin_combo")
@@ -187,7 +187,7 @@ def test_words_stand_out_from_what_they_stand_on(theme: Theme) -> None:
             ("warning", "panel"),
         ]
     }
-    assert not {pair: round(value, 2) for pair, value in pairs.items() if value < LEAST_CONTRAST}
+    assert not {pair: round(value, 2) for pair, value in pairs.items() if value < MIN_CONTRAST}
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
@@ -199,7 +199,7 @@ def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> No
         hovered, ground = (tuple(color(which)) for which in (c.header_hovered, c.popup_bg))
     finally:
         imgui.destroy_context(context)
-    assert contrast(hovered, ground) > LEAST_HOVER_CONTRAST
+    assert contrast(hovered, ground) > MIN_HOVER_CONTRAST
 
 
 MASK = ApertureMask("star.png", 1, 1, b"\xff")

@@ -3,7 +3,7 @@ import pytest
 from scipy import ndimage
 
 from iibr_core.depth.edges import labels
-from iibr_core.depth.edges.labels import BAND_PX, VOTE, label_edges
+from iibr_core.depth.edges.labels import BAND_PX, NEIGHBOUR_WEIGHT, label_edges
 from tests.iibr_core.scenes import smooth_texture
 
 EDGE, NEAR, FAR = 0.3, 5.0, 1.0
@@ -51,7 +51,7 @@ def slow_weigh(colors, values, distance, y, x, alike):
             continue
         side = 0 if apart[0] <= apart[1] else 1
         w = np.exp(-((p[0] - y) ** 2 + (p[1] - x) ** 2) / (2 * (labels.SAMPLED_PX / 2) ** 2))
-        w *= labels.TRUST[distance[p]]
+        w *= labels.SAMPLE_WEIGHTS[distance[p]]
         weights[side].append(w)
         seen[side].append(colors[p].astype(np.float64))
         likes[side] += w * np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
@@ -78,7 +78,7 @@ def slow_pass(colors, values, other, drive, alike, believed):
         for p in around(values, y, x, 1):
             like = np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
             votes = believed[p] * says(values[p]) + (1 - believed[p]) * says(other[p])
-            total += VOTE * like * votes
+            total += NEIGHBOUR_WEIGHT * like * votes
         belief[y, x] = 1 / (1 + np.exp(-np.clip(total, -30, 30)))
     return belief
 
@@ -87,7 +87,7 @@ def slow_errors(evidence, side, distance, known):
     """By (in front?, distance)."""
 
     def contradicted(*where, expected=0.05):
-        clear = evidence[np.logical_and.reduce([known, np.abs(evidence) > VOTE, *where])]
+        clear = evidence[np.logical_and.reduce([known, np.abs(evidence) > NEIGHBOUR_WEIGHT, *where])]
         return ((clear < 0).sum() + 20 * expected) / (len(clear) + 20)
 
     wrong, far = {}, BAND_PX
@@ -97,7 +97,7 @@ def slow_errors(evidence, side, distance, known):
             chance = max(misled, labels.MIXED_SHARES[s] if k == 0 else 0)
             share = contradicted(side == s, distance == k, expected=misled)
             here = known & (side == s) & (distance == k)
-            is_told = here.any() and (np.abs(evidence[here]) > VOTE).mean() >= labels.MIN_CLEAR_SHARE
+            is_told = here.any() and (np.abs(evidence[here]) > NEIGHBOUR_WEIGHT).mean() >= labels.MIN_CLEAR_SHARE
             share = share - chance if is_told and misled <= labels.MIN_CLEAR_SHARE * share else 0
             share /= max(1 - misled - chance, 0.1)
             wrong[s, k] = np.clip(share, labels.UNLIKELY, 1 - labels.UNLIKELY)
@@ -113,7 +113,7 @@ def slow_labels(colors, values, unknown):
         other[y, x], evidence[y, x] = slow_weigh(colors, values, distance, y, x, alike)
     side = (values > other).astype(int)
     wrong = slow_errors(evidence, side, distance, ~unknown & band)
-    odds = {at: VOTE * np.log((1 - share) / share) for at, share in wrong.items()}
+    odds = {at: NEIGHBOUR_WEIGHT * np.log((1 - share) / share) for at, share in wrong.items()}
     drive = np.full(values.shape, np.inf)
     for p in map(tuple, np.argwhere(band & (other != values))):
         drive[p] = evidence[p] + (0 if unknown[p] else odds[side[p], distance[p]])

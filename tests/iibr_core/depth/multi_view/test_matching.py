@@ -8,7 +8,7 @@ from iibr_core.depth.guided_filter import GuidedFilter
 from iibr_core.depth.multi_view.matching import (
     HIDDEN_DIFFERENCE,
     HIDDEN_FACTOR,
-    MAX_DIFFERENCE,
+    MAX_TEXTURE_DIFFERENCE,
     MIN_SEEN_SHARE,
     _match,
     _store_costs,
@@ -51,9 +51,9 @@ def test_matching_equals_its_slow_twin(disparity):
             row, column = y - disparity * t, x - disparity * s
             if 0 <= row <= 6 and 0 <= column <= 7:
                 value = map_coordinates(texture.astype(np.float64), [[row], [column]], order=1)[0]
-                costs.append((t, s, min((value - textures[0, y, x]) ** 2, MAX_DIFFERENCE**2)))
+                costs.append((t, s, min((value - textures[0, y, x]) ** 2, MAX_TEXTURE_DIFFERENCE**2)))
         is_seen = len(costs) >= MIN_SEEN_SHARE * 8
-        everything = np.mean([cost for *_, cost in costs]) if is_seen else MAX_DIFFERENCE**2
+        everything = np.mean([cost for *_, cost in costs]) if is_seen else MAX_TEXTURE_DIFFERENCE**2
         sides = (lambda t, s: s < 0, lambda t, s: s > 0, lambda t, s: t < 0, lambda t, s: t > 0)
         halves = [[cost for t, s, cost in costs if is_there(t, s)] for is_there in sides]
         expected = [np.mean(half) if half and is_seen else everything for half in halves]
@@ -68,7 +68,7 @@ def test_views_are_hidden_where_the_other_half_matches_much_better():
     _store_costs(parts, found)
     cost = np.minimum(parts[4], np.maximum(HIDDEN_FACTOR * parts[:4].min(axis=0), HIDDEN_DIFFERENCE**2))
     assert (cost < parts[4]).any()
-    np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_DIFFERENCE, 1), atol=1.01)
+    np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_TEXTURE_DIFFERENCE, 1), atol=1.01)
 
 
 def slow_sums(costs, luma):
