@@ -152,16 +152,16 @@ class App:
     def _is_resting(self) -> bool:
         """Whether nothing moves, all views are there and nothing is being drawn for a file."""
         state, view = self.state, self.scene_view
-        is_made = state.progress.is_complete or state.stopped == state.generation
         is_shown = view.generation == state.generation and view.renderer.is_converged
         is_moving = state.motion.is_running or state.stroke is not None
-        return is_made and is_shown and not is_moving and not self._side_effects.is_drawing
+        return not state.is_making_views and is_shown and not is_moving and not self._side_effects.is_drawing
 
     @property
     def wait_s(self) -> float:
         """Time that the next turn may sleep, in seconds."""
         is_behind = self.scene_loader.holds_progress or not self.scene_view.shows_all_views()
         is_behind |= not self.stereo_screen.view.shows_all_views
+        is_behind |= self.state.is_making_views and not self.scene_view.renderer.is_converged
         idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
         return self._pace.wait_s(self.state.motion.is_running, self._pointer.is_over_panel, idle_s)

@@ -105,7 +105,7 @@ class InspectionView:
         views, exposure = (view.generation, view.views_uploaded, view.previews), 2.0**state.optics.exposure_stops
         frame = _Frame(state, scene, field, layout, layout.frame_px.size, exposure, view.generation, views)
         names = {"overlay": self._overlay(frame), "minimap": self._minimap(frame)}
-        if field.grid == scene.grid:  # else: only the photo is there, or a preview of its depth
+        if not field.is_single:  # else: only the photo is there, or a preview of its depth
             names |= self._strips(frame)
             names["sheet"] = self._sheet(frame) if state.inspection.shows_views else None
             names["compared"] = self._compared(frame)
@@ -237,7 +237,7 @@ class InspectionView:
         kind, field, entropy = frame.state.inspection.overlay, frame.field, self._entropy
         if frame.state.selection is not None and self._surface is not None:
             return _OverlayValues("surface", field.grid.centre, self._surface.mask)
-        if kind is None or (kind != "disparity" and field.grid != frame.scene.grid):
+        if kind is None or (kind != "disparity" and field.is_single):
             return None
         if kind == "entropy":
             if entropy is None or entropy.generation != frame.generation:

@@ -17,12 +17,13 @@ from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.scenes.scene_gloss import GlossRequest, gloss_request
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
+from iibr_core.types import FloatImage, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import box_around
 from viewer.gpu.refocus.picture_renderer import Renderer
+from viewer.gpu.refocus.views_seen import views_seen
 from viewer.model.state.app_state import AppState, DrawReport, Picture
 
 if TYPE_CHECKING:
@@ -32,13 +33,15 @@ VIEW_REFRESH_S = 0.25
 """Seconds between pictures that only new views change: a picture for each view would delay the hand."""
 
 STILL_BUDGET_S = 0.08
-"""Time for a picture that only new views change, in seconds: no hand waits for it, and it is shown longer."""
-NO_MORE_VIEWS_S = 2.0
-"""Seconds without a new view after which no view is expected."""
+"""Time for a step of a picture that is fine already, in seconds: no hand waits for it."""
+FINE_PASSES = 4
+"""Number of passes of a picture while views that it will show are missing; the other passes follow."""
+MORE_VIEWS = 2.0
+"""Ratio of the final views that a picture will show to those that it shows, from which on it is drawn again while views
+are made: a few more views change the noise, not the picture.
+"""
 WAITING_VIEWS = 4
 """Number of waiting views at which the worker pauses."""
-PREVIEW_GRID = GridShape(1, 1)
-"""Grid of the field that holds the centre view until the second view comes."""
 
 
 class SceneView:
@@ -59,22 +62,26 @@ class SceneView:
         self._scene: Scene | None = None
         self._fallback_view: ViewUpdate | None = None
         self._gloss: GlossMaps | None = None
-        self._is_preview = self._is_edited = self._shows_one_view = False
+        self._is_preview = self._is_edited = self._holds_picture = self._is_settled = False
+        self._seen: frozenset[tuple[int, int]] | None = None
+        self._final_seen = 0
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
         self._disparities: dict[ViewOffset, FloatImage] = {}
-        self._drawn_at = self._view_came_at = 0.0
+        self._drawn_at = 0.0
 
     def open(self, ready: SceneReady) -> None:
         """Show this scene from now on. Raises InputError if it does not fit the graphics card; the old scene stays.
 
         The first view has a field of its own until the second comes, because allocating a whole field takes a while.
+        The picture of the same photo stays until the new one has its first pass.
         """
-        scene, centre = ready.scene, ready.centre
+        scene, centre, before = ready.scene, ready.centre, self._scene
         self.show_fallback(None)
         self._show_alone(scene, centre, centre.disparity, None)
         self.generation, self.loaded, self._scene, self.centre = ready.generation, ready.loaded, scene, centre
         self._gloss, self._is_edited = None, False
+        self._holds_picture = before is not None and before.source is scene.source
         self._disparities.clear()
         self._keep_for_picking(scene, centre)
 
@@ -93,7 +100,7 @@ class SceneView:
         if differs is None or field.is_shared or _is_beyond(disparity[differs], field.range_px):
             self._show_alone(scene, replace(centre, is_final=True), disparity, self._gloss)
         elif differs.any():
-            self.renderer.change_disparity(0, 0, disparity, box_around(differs))
+            self.renderer.change_disparity(*scene.grid.centre, disparity, box_around(differs))
         self._disparities = {CENTRE: disparity}
         self.previews += 1
 
@@ -126,11 +133,10 @@ class SceneView:
             self._is_final[scene.grid.centre] = view.is_final
             return  # uploaded when the scene was opened
         if self._is_preview:
-            self._open_field(scene, scene.grid, self._gloss)
+            self._open_field(scene, self._gloss)
             self.renderer.upload_view(*scene.grid.centre, centre.colors, centre.disparity)
             self._is_preview = False
         self._waiting.append(view)
-        self._view_came_at = time.perf_counter()
         self._keep_for_picking(scene, view)
 
     @property
@@ -151,7 +157,9 @@ class SceneView:
             self._waiting.popleft()
             self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
             self.views_uploaded += 1
-            self._is_final[view.row, view.column] = view.is_final
+            at = view.row, view.column
+            self._is_final[at] = view.is_final
+            self._is_settled &= self._seen is not None and (at not in self._seen or len(self._seen) == 1)
         return bool(self._waiting)
 
     def upload_all(self) -> None:
@@ -174,22 +182,25 @@ class SceneView:
         optics, drawn, budget_s = state.shown_optics, self.picture_drawn, self._gl.frame_budget_s
         picture = Picture(self.generation, self.views_uploaded, optics, size_px, previews=self.previews, part=part)
         if drawn is not None and drawn == replace(picture, views_uploaded=drawn.views_uploaded, samples=drawn.samples):
-            is_same = self.shows_all_views()
-            if self.renderer.is_renewing or (is_same and self._refines()):
-                self.renderer.refine(budget_s)
+            is_making, is_soft = state.is_making_views, not self.renderer.passes_shown
+            is_soon = time.perf_counter() - self._drawn_at < VIEW_REFRESH_S
+            if is_soon and is_making and not is_soft:
+                return drawn  # the processor is needed for views
+            if self._refines(is_making):
+                self.renderer.refine(STILL_BUDGET_S if is_making and not is_soft else budget_s)
+                self._drawn_at = time.perf_counter()
                 self.picture_drawn = replace(drawn, samples=drawn.samples + 1)
                 return self.picture_drawn
-            if is_same or time.perf_counter() - self._drawn_at < VIEW_REFRESH_S:
+            if is_soon or not self._renews(is_making):
                 return drawn
-            if self.renderer.passes_shown:  # the shown picture must not become softer
-                self.renderer.renew(optics, size_px, part)
-            else:
-                self.renderer.render_in_time(optics, size_px, STILL_BUDGET_S, part)
+            self.renderer.renew(optics, size_px, part)
+        elif self._holds_picture and drawn is not None and (drawn.size_px, drawn.part) == (size_px, part):
+            self.renderer.renew(optics, size_px, part, is_coarse=True)
         else:
             self.renderer.render_in_time(optics, size_px, budget_s, part)
-        self._drawn_at = time.perf_counter()
+        self._drawn_at, self._holds_picture = time.perf_counter(), False
         self.pictures_drawn += 1
-        self._shows_one_view = self._is_one_view(optics)
+        self._note_views(optics)
         self.picture_drawn = replace(picture, samples=self.renderer.samples)
         return self.picture_drawn
 
@@ -220,7 +231,7 @@ class SceneView:
     def shows_all_views(self) -> bool:
         """Return whether the last picture shows every uploaded view, or would not change by those missing."""
         drawn = self.picture_drawn
-        return drawn is None or self._shows_one_view or drawn.views_uploaded == self.views_uploaded
+        return drawn is None or self._is_settled or drawn.views_uploaded == self.views_uploaded
 
     def release(self) -> None:
         """Free the GL objects."""
@@ -230,37 +241,54 @@ class SceneView:
         self, scene: Scene, centre: ViewUpdate, disparity: FloatImage | None, gloss: GlossMaps | None
     ) -> None:
         """Show the centre view in a field of one view."""
-        self._open_field(scene, PREVIEW_GRID, gloss)
-        self.renderer.upload_view(0, 0, centre.colors, disparity)
+        self._open_field(scene, gloss, is_single=True)
+        self.renderer.upload_view(*scene.grid.centre, centre.colors, disparity)
         self.views_uploaded, self._is_final = 1, {scene.grid.centre: centre.is_final}
         self._is_preview = True
         self._waiting.clear()
 
-    def _open_field(self, scene: Scene, grid: GridShape, gloss: GlossMaps | None) -> None:
+    def _open_field(self, scene: Scene, gloss: GlossMaps | None, is_single: bool = False) -> None:
         size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
-        self.renderer.open_field(grid, *size, scene.color_space, scene.row_step)
+        self.renderer.open_field(scene.grid, *size, scene.color_space, scene.row_step, is_single)
         self.renderer.set_gloss(gloss)
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):
             self._disparities[scene.viewpoint(view.row, view.column)] = view.disparity
 
-    def _is_one_view(self, optics: Optics) -> bool:
-        """Return whether this picture is one final view, so that views to come do not change it."""
-        if self._scene is None or self._fallback_view is not None or optics.aperture_diameter > 1 or optics.dolly != 0:
-            return False
-        (v, u), (t, s) = self._scene.grid.centre, map(round, optics.eye)
-        return (t, s) == optics.eye and self._is_final.get((v + t, u + s), False)
-
     @property
     def _has_all_views(self) -> bool:
         return self._scene is not None and sum(self._is_final.values()) == math.prod(self._scene.grid)
 
-    def _refines(self) -> bool:
-        """Return whether there is more to draw, and time for it: the processor has none while it makes views."""
-        is_quiet = self._has_all_views or self._shows_one_view
-        is_quiet = is_quiet or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
-        return not self.renderer.is_converged and is_quiet
+    def _note_views(self, optics: Optics) -> None:
+        """Keep which views the picture that is begun will show, and whether all of them are there and final."""
+        assert self._scene is not None
+        grid, (row, column) = self._scene.grid, self._scene.grid.centre
+        seen = set() if self._fallback_view is not None else views_seen(optics, grid)
+        self._seen = None if seen is None else frozenset((row + round(at.t), column + round(at.s)) for at in seen)
+        self._final_seen = self._count_final_seen()
+        self._is_settled = self._final_seen == self._seen_count
+
+    @property
+    def _seen_count(self) -> int:
+        assert self._scene is not None
+        return math.prod(self._scene.grid) if self._seen is None else len(self._seen)
+
+    def _count_final_seen(self) -> int:
+        return sum(final for at, final in self._is_final.items() if self._seen is None or at in self._seen)
+
+    def _refines(self, is_making: bool) -> bool:
+        """Return whether more samples would make the picture better that is begun, or that is shown."""
+        is_passing = is_making and not self._is_settled
+        is_fine = self.renderer.passes_shown >= FINE_PASSES and not self.renderer.is_renewing
+        return not (self.renderer.is_converged or (is_passing and is_fine))
+
+    def _renews(self, is_making: bool) -> bool:
+        """Return whether the picture is to be drawn again for the views that came since it was begun."""
+        if self.shows_all_views():
+            return False
+        final = self._count_final_seen()
+        return not is_making or final == self._seen_count or final >= MORE_VIEWS * self._final_seen
 
 
 def _is_beyond(values: FloatImage, range_px: tuple[float, float]) -> bool:

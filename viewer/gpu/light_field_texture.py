@@ -39,8 +39,8 @@ class LightFieldTexture:
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. layers: (V, U), layer of each view. present, has_disparity: (V, U) bool. uploads: (V, U), number of times
     that a view was stored. color_space: of the light. row_step: distance between rows, in distances between
-    columns. gloss: maps of a glossy surface, None without. range_px:
-    (farthest, nearest) disparity, known from the first view that has any.
+    columns. gloss: maps of a glossy surface, None without. range_px: (farthest, nearest) disparity, known from the
+    first view that has any. is_single: there is room for one of several views.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class LightFieldTexture:
         with_disparity: bool,
         is_single: bool = False,
     ) -> None:
-        """Allocate the arrays. is_single: there is room for one view only.
+        """Allocate the arrays. is_single: there is room for one view only, at any place of the grid.
 
         Raises InputError if this graphics driver cannot hold them, with what to do.
         """
@@ -61,7 +61,7 @@ class LightFieldTexture:
         check_fits(ctx, GridShape(1, 1) if is_single else grid, width, height)
         self._ctx = ctx
         self.grid, self.width, self.height, self.hdr, self.color_space = grid, width, height, hdr, SRGB
-        self.row_step = 1.0
+        self.row_step, self.is_single = 1.0, is_single and math.prod(grid) > 1
         self.layers = np.arange(math.prod(grid)).reshape(grid) * (not is_single)
         self.present, self.has_disparity, self.uploads = np.zeros(grid, bool), np.zeros(grid, bool), np.zeros(grid, int)
         self.range_px = (0.0, 0.0)

@@ -8,18 +8,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from iibr_core.scenes.scene import SceneReady
+from iibr_core.beyond.optics import CENTRE
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import ViewOffset
-from tests.viewer.conftest import headless_with_scene
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import headless_with_scene, write_scene
 from viewer.display import scene_view
 from viewer.display.offscreen import OffscreenScene
 from viewer.display.scene_view import SceneView
-from viewer.model import lens
+from viewer.model import lens, opening
 from viewer.model.action import Action, do
+from viewer.model.state.app_state import AppState
 
 SIZE = ScreenSize(384, 256)
+WORSE_DB = 1.0
+"""Largest loss from a frame to a later frame at the same settings, in dB."""
 
 
 @pytest.fixture
@@ -104,3 +110,53 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: O
     view.upload_all()
     view.converge(opened.state, SIZE)
     assert view.renderer.read_image().min() == 255
+
+
+def psnr_db(image: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
+    return float(10 * np.log10(255**2 / max(np.square(image.astype(float) - other).mean(), 1e-3)))
+
+
+def frames_of(view: SceneView, state: AppState, most: int) -> Iterator[NDArray[np.uint8]]:
+    """Draw frames, at most that number; yield the picture on the screen after each."""
+    for _ in range(most):
+        view.draw(state, SIZE)
+        yield view.renderer.read_image()
+
+
+@pytest.mark.parametrize("frames_a_view", [3, 40], ids=["views come quickly", "views come slowly"])
+def test_a_still_picture_never_gets_worse_while_views_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frames_a_view: int
+) -> None:
+    monkeypatch.setattr(scene_view, "VIEW_REFRESH_S", 0.0)
+    source, frames = Source(str(write_scene(tmp_path)), grid=GridShape(5, 5)), []
+    with OffscreenScene("egl") as viewer:
+        monkeypatch.setattr(type(viewer.gl), "frame_budget_s", 1e-9)
+        viewer.do(do(opening.open_source, source))
+        for result in results_of(SceneRequest(viewer.state.generation, source, 3.0), lambda: CENTRE):
+            if isinstance(result, SceneReady):
+                viewer.do(do(opening.show_scene, result.generation, result.scene), do(lens.apply_preset, "macro"))
+                viewer.view.open(result)
+            else:
+                viewer.view.add(result.view)
+                viewer.view.upload_all()
+                viewer.do(do(opening.set_progress, result.generation, result.progress))
+            frames += frames_of(viewer.view, viewer.state, frames_a_view)
+            assert frames_a_view == 3 or viewer.view.renderer.passes_shown, "as fine as the window is"
+        assert not viewer.state.is_making_views
+        frames += frames_of(viewer.view, viewer.state, 40)
+        viewer.view.converge(viewer.state, SIZE)
+        settled = viewer.view.renderer.read_image()
+    quality = np.array([psnr_db(frame, settled) for frame in frames])
+    assert (quality >= np.maximum.accumulate(quality) - WORSE_DB).all(), quality.round(1).tolist()
+    assert quality[0] < quality[-1] - 3, "the first frame is a draft"
+
+
+def test_the_picture_of_a_photo_stays_until_that_of_its_next_scene_is_fine(opened: OffscreenScene) -> None:
+    view, scene, before = opened.view, opened.state.scene, opened.view.renderer.read_image()
+    assert scene is not None
+    assert view.centre is not None
+    white = replace(view.centre, colors=np.full_like(view.centre.colors, 255))
+    view.open(SceneReady(view.generation + 1, scene, view.loaded, white))
+    shown = list(frames_of(view, opened.state, 40))
+    assert np.array_equal(shown[0], before)
+    assert {int(frame.min()) for frame in shown} == {int(before.min()), 255}, "no draft between"

@@ -78,14 +78,16 @@ class Renderer:
         with_disparity: bool,
         color_space: ColorSpace = SRGB,
         row_step: float = 1.0,
+        is_single: bool = False,
     ) -> None:
         """Start an empty light field of this size in place of the one before.
 
-        color_space: of its views. row_step: distance between its rows, in distances between columns.
+        color_space: of its views. row_step: distance between its rows, in distances between columns. is_single: there
+        is room for one view only.
 
         Raises InputError if the graphics driver cannot hold it; the field before then stays.
         """
-        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity)
+        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity, is_single)
         field.color_space, field.row_step = color_space, row_step
         if self.field is not None:
             self.field.release()
@@ -159,12 +161,13 @@ class Renderer:
             self.passes_shown = 0
         self._report(drawn.done, seconds)
 
-    def renew(self, optics: Optics, size_px: ScreenSize, part: Rect = WHOLE) -> None:
+    def renew(self, optics: Optics, size_px: ScreenSize, part: Rect = WHOLE, is_coarse: bool = False) -> None:
         """Begin the shown picture again because its views have changed: `refine` draws it.
 
-        The old picture stays until the new one has as many passes. Views that come in between are drawn in the passes
-        that follow, so that they do not delay the new picture.
+        The old picture stays until the new one has as many passes; if it is coarse, until the new one has its first.
+        Views that come in between are drawn in the passes that follow, so that they do not delay the new picture.
         """
+        self.passes_shown = 0 if is_coarse else self.passes_shown
         self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
         self._shown_from_pass = min(self.passes_shown, self._accumulation.passes)
 

@@ -147,6 +147,12 @@ class AppState:
         return Optics() if self.shows_before else self.optics
 
     @property
+    def is_making_views(self) -> bool:
+        """Whether a scene is being read, or views of it are being made."""
+        progress, is_stopped = self.progress, self.stopped == self.generation
+        return not (is_stopped or progress.is_complete) and bool(progress.doing or progress.total)
+
+    @property
     def is_panel_hidden(self) -> bool:
         """Whether the panel is hidden: by the user, or because the window is narrow or shows a stereo picture."""
         return self.is_narrow or self.stereo.fills_window if self.hides_panel is None else self.hides_panel
