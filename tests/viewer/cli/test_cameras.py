@@ -99,3 +99,13 @@ def test_an_hci_folder_of_views_without_disparity_states_its_range(iibr: Iibr, f
     assert low == pytest.approx(-1.4, abs=0.3)
     assert low < high < 0.6
     assert scene.infinity_px < low
+
+
+def test_a_densified_field_states_the_same_distances(iibr: Iibr, folder: Path) -> None:
+    """Twice as many steps, each half as long: a point at infinity moves half as far in each."""
+    (folder / "wall").mkdir()
+    output_of(iibr("export", write_wall(folder / "wall", -1.4), "--to", "hci", "-o", "given"))
+    output_of(iibr("generate", "given", "--grid", 5, "-o", "dense"))
+    given, dense = (open_light_field(Path(name)) for name in ("given", "dense"))
+    assert given.infinity_px < -1
+    assert dense.infinity_px == pytest.approx(given.infinity_px / 2, abs=0.01)

@@ -8,16 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
-from tests.viewer.conftest import headless_with_scene
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ViewOffset
+from tests.viewer.conftest import WIDTH, headless_with_scene
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import depth, inspection
+from viewer.model import depth, inspection, lens
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import Hover
-from viewer.model.state.depth import Brush
+from viewer.model.state.depth import Brush, DepthSample
+from viewer.model.window import layout_for
 
 SIZE = 640, 800
 PANEL = np.s_[:, -int(PANEL_WIDTH) :]
@@ -59,6 +63,21 @@ def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: Offscr
     changed = differs(before, viewer.screen(SIZE))
     assert changed[PANEL].sum() > 500
     assert changed[PICTURE].sum() > 100
+
+
+@pytest.mark.parametrize("eye", [CENTRE, ViewOffset(0.6, -0.8)])
+def test_the_ring_of_a_picked_depth_stays_on_its_surface(viewer: OffscreenScene, eye: ViewOffset) -> None:
+    """The place in the middle of the scene is picked: a surface that moves by 20 px a view step."""
+    viewer.do(do(lens.move_eye, eye))
+    viewer.do(do(depth.set_brush, Brush(tool="level", is_on=True)))
+    before = viewer.screen(SIZE)
+    viewer.do(do(depth.set_brush, Brush(tool="level", is_on=True, sample=DepthSample((0.5, 0.5), 20.0))))
+    ring = np.argwhere(differs(before, viewer.screen(SIZE))[PICTURE])
+    picture = layout_for(viewer.state, ScreenSize(*SIZE), 1.0, 1.0).picture
+    assert picture is not None
+    px = picture.width / WIDTH
+    middle = picture.y + picture.height / 2 - 20 * eye.t * px, picture.x + picture.width / 2 - 20 * eye.s * px
+    np.testing.assert_allclose((ring.min(axis=0) + ring.max(axis=0)) / 2, middle, atol=2)
 
 
 def test_a_stroke_under_way_is_seen_in_colours(viewer: OffscreenScene) -> None:
