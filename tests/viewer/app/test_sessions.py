@@ -19,7 +19,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import DEADLINE_S, Driver, Opener, rests
-from viewer.app.session_store import SessionStore, key_of
+from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
@@ -172,6 +172,22 @@ def test_many_strokes_are_painted_beside_the_window(
     assert len(loaded.depth_settings.edits.strokes) == 41
     wanted = apply_edits(loaded.photo.pixels, loaded.refined.values, loaded.depth_settings.edits)
     assert np.array_equal(loaded.disparity.values, wanted)
+
+
+def test_of_too_many_sessions_the_oldest_go(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "kept" / "sessions"
+    folder.mkdir(parents=True)
+    for number in range(MAX_SESSIONS + 2):
+        path = folder / f"{(number * 7) % (MAX_SESSIONS + 2):04d}.json"
+        path.write_text("{}")
+        os.utime(path, (number, number))
+    oldest = {f"{number * 7:04d}.json" for number in range(3)}
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    change(driver)
+    driver.until(lambda app: len(sessions_in(tmp_path / "kept")) == MAX_SESSIONS)
+    kept = {path.name for path in sessions_in(tmp_path / "kept")}
+    assert not oldest & kept
+    assert f"{key_of(Source(str(photo_path), grid=ONE))}.json" in kept
 
 
 def test_a_folder_that_cannot_be_written_gives_one_notice(

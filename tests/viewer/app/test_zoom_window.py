@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import NEAR, Driver, Opener
+from viewer.background.newest import Newest
 from viewer.model import lens, viewpoint
 from viewer.model.action import do
 from viewer.model.state.viewpoint import Zoom
@@ -92,7 +94,9 @@ def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window
     viewer.until(lambda app: app.sharpener.pixels is None)
 
 
-def test_a_photo_that_is_gone_is_reported_and_the_views_stay(open_window: Opener, photo_path: Path) -> None:
+def test_a_photo_that_is_gone_is_reported_once_and_the_views_stay(
+    open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
     viewer.until_idle()
     photo_path.unlink()
@@ -101,3 +105,9 @@ def test_a_photo_that_is_gone_is_reported_and_the_views_stay(open_window: Opener
     viewer.until_idle()
     assert viewer.app.sharpener.pixels is None
     assert viewer.image().std() > 10
+    asked: list[object] = []
+    monkeypatch.setattr(Newest, "submit", lambda _, request: asked.append(request))
+    for place in ((0.3, 0.5), (0.6, 0.4)):
+        zoom_to(viewer, Zoom(12.0, place))
+        viewer.until_idle()
+    assert not any(isinstance(request, FullPicture) for request in asked), "a pan does not try again"
