@@ -1,0 +1,122 @@
+"""The next photo in a real window looks and behaves as if it were the first one: nothing of the photo before stays."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageGrab
+
+from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.gloss.settings import Gloss
+from iibr_core.scenes.scene import Source
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import Driver, Opener, write_scene
+from viewer.model import depth, gesture, inspection, lens, opening, selection, viewpoint
+from viewer.model.action import Action, do
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth import DepthSample
+from viewer.model.state.viewpoint import Zoom
+
+GRID = GridShape(3, 3)
+OF_THE_PROGRAM = {
+    *("source", "scene", "generation", "shown_generation", "progress", "preferences", "recent", "existing_recent"),
+    *("report", "notices", "models", "facts", "folder", "exports", "last_export", "tasks", "has_dialogs", "monitors"),
+    *("hides_panel", "is_narrow", "inspection", "brush"),
+}
+"""Parts of the state that do not belong to a photo, or name its file; the test compares what of them is the photo's."""
+
+SAMPLING_LEVELS = 24
+"""Largest difference of two pictures through an open lens at rest, of 255; parts of another photo differ by 50."""
+
+
+def of_the_photo(state: AppState) -> dict[str, object]:
+    """Return all that a photo has in the state."""
+    found = {field.name: getattr(state, field.name) for field in fields(state) if field.name not in OF_THE_PROGRAM}
+    look = state.inspection
+    return found | {
+        "brush's depth": state.brush.sample,
+        "findings": (look.place, look.probe, look.snapshot),
+        "notices": [notice.text for notice in state.notices if "." in notice.text and not notice.is_result],
+        "range": state.scene.disparity_range_px if state.scene is not None else None,
+    }
+
+
+def everything(driver: Driver) -> None:
+    """Change all that can be changed of the open photo, and look at it in every way."""
+
+    def change(*actions: Action) -> None:
+        driver.app.do(*actions)
+        driver.until_idle()
+
+    change(do(depth.set_tone, replace(UNEDITED, gamma=1.5), is_finished=True))
+    brush = replace(driver.app.state.brush, is_on=True, radius=0.2)
+    change(do(depth.set_brush, brush), do(depth.paint, (0.4, 0.5)), do(gesture.end_gesture))
+    change(do(depth.set_brush, replace(brush, tool="level")), do(depth.pick, DepthSample((0.5, 0.5), 1.0)))
+    change(do(depth.set_brush, replace(brush, is_on=False)), do(selection.select, (0.5, 0.5)))
+    change(do(lens.set_depth_strength, 1.5, is_finished=True), do(lens.focus_on, (0.5, 0.5), 0.5))
+    change(do(lens.set_gloss, Gloss(roughness=0.5, reflectance=0.5)))
+    change(do(lens.set_focus_tilt, (0.3, 0.1)), do(lens.show_tilt_handles, True), do(lens.set_dolly, 0.3))
+    change(do(viewpoint.set_zoom, Zoom(8.0, (0.4, 0.6))), do(inspection.set_overlay, "inpainted"))
+    change(do(inspection.take_snapshot), do(inspection.compare, "snapshot"), do(inspection.set_overlay, "disparity"))
+    change(do(viewpoint.set_loop, "swing"), do(viewpoint.pause, True), do(lens.move_eye, ViewOffset(0.7, -0.6)))
+    change(do(inspection.compare, None), do(inspection.set_overlay, None))
+
+
+def seen(driver: Driver) -> list[np.ndarray]:
+    """Return the window's picture at rest, from a corner, with each map, with an open lens and with gloss."""
+    app, pictures = driver.app, []
+    looks: tuple[tuple[Action, ...], ...] = (
+        (), (do(lens.move_eye, ViewOffset(1.0, 1.0)),),
+        (do(inspection.set_overlay, "inpainted"),), (do(inspection.set_overlay, "disparity"),),
+        (do(inspection.set_overlay, None), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.3)),
+        (do(lens.set_gloss, Gloss(roughness=0.5, reflectance=0.5)),),
+    )  # fmt: skip
+    for actions in looks:
+        app.do(*actions)
+        driver.send("mousemove", 3, 3)
+        driver.until(lambda app: app.state.hover is None)
+        driver.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
+        driver.until_idle()
+        place, frame = app.window.place, app.layout().frame
+        assert place is not None
+        assert frame is not None
+        left, top = place[0] + frame.x, place[1] + frame.y
+        box = left + 8, top + 40, left + frame.width - 8, top + frame.height - 40
+        pictures.append(np.asarray(ImageGrab.grab(xdisplay=os.environ["DISPLAY"]).convert("RGB").crop(box)).astype(int))
+    return pictures
+
+
+def next_photo(folder: Path) -> Path:
+    """Write a mirrored photo of another scene: everything lies elsewhere."""
+    path = write_scene(folder, "next", seed=3)
+    Image.open(path).transpose(Image.Transpose.ROTATE_180).save(path)
+    map_path = folder / "next_disparity.npy"
+    np.save(map_path, np.roll(np.load(map_path), 16, axis=1)[::-1, ::-1])
+    return path
+
+
+@pytest.mark.usefixtures("wide_window")
+def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window: Opener, tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    after, first = next_photo(tmp_path / "b"), write_scene(tmp_path / "a")
+    driver = open_window(first, grid=GRID)
+    driver.until_idle()
+    everything(driver)
+    before = of_the_photo(driver.app.state)
+    driver.app.do(do(opening.open_source, Source(str(after), grid=GRID)))
+    driver.until(lambda app: app.state.scene is not None and app.state.scene.name == "next")
+    driver.until_idle()
+    state, pictures = of_the_photo(driver.app.state), seen(driver)
+    driver.close()
+    fresh = open_window(after, grid=GRID)
+    fresh.until_idle()
+    expected = of_the_photo(fresh.app.state)
+    assert sum(before[name] != expected[name] for name in expected) > 10, "much was changed"
+    assert state == expected
+    for found, wanted in zip(pictures, seen(fresh), strict=True):
+        assert np.abs(found - wanted).max() <= SAMPLING_LEVELS
