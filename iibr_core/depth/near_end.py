@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.guess import box_filter, guess_depth, resize_picture, size_within
+from iibr_core.formats.maps.resample import nearest_pixels
 from iibr_core.types import FloatImage, Photo, image_size
 
 COMPARED_PX = 160
@@ -61,11 +62,10 @@ def zeros_are_depth(values: FloatImage, is_zero: NDArray[np.bool_]) -> bool:
 def _at_compared_size(photo: FloatImage, values: FloatImage) -> tuple[FloatImage, FloatImage]:
     """Return the photo made small, and the nearest values of the map."""
     size = size_within(image_size(photo), COMPARED_PX)
-    rows, columns = (((np.arange(n) + 0.5) * side / n).astype(int) for n, side in zip(size, values.shape))
     # Some pixels of each area are enough for its mean: large photos would take a second.
     step = max(min(photo.shape[:2]) // (SAMPLES_ACROSS * min(size)), 1)
     sampled = np.clip(np.nan_to_num(photo[::step, ::step]), 0, 1)
-    return resize_picture(sampled, size), values[rows[:, None], columns]
+    return resize_picture(sampled, size), nearest_pixels(values, size)
 
 
 def _ranks(values: FloatImage) -> NDArray[np.float64]:

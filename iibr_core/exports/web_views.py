@@ -20,6 +20,7 @@ from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.exports.web_streams import SMALL_SPEED, Stream, chroma_of, encode_levels, luma_of
 from iibr_core.formats.images.color_profile import icc_profile
+from iibr_core.formats.maps.resample import nearest_pixels
 from iibr_core.types import (
     DISPLAY_P3,
     SRGB,
@@ -163,7 +164,7 @@ class ViewStore:
         stored = image_size(self._colors[places[0]])
         size = form.size_of(stored)
         colors = [_smaller_colors(self._colors[place], size) for place in places]
-        depths = [_smaller_depth(self._disparities[place], size) for place in places if place in self._disparities]
+        depths = [nearest_pixels(self._disparities[place], size) for place in places if place in self._disparities]
         far, near = (size.width / stored.width * value for value in self._range_px)
         has_disparity, is_video = len(depths) == len(colors), form.is_video
         pictures = {} if is_video else {"colors": _moving(colors, form.quality, self._space, "4:4:4")}
@@ -201,13 +202,6 @@ def _smaller_colors(colors: Bytes, size: ImageSize) -> Bytes:
     if size == image_size(colors):
         return colors
     return bytes_from_encoded(srgb_from_linear(mean_of_areas(linear_from_srgb(colors / np.float32(255)), size)))
-
-
-def _smaller_depth(levels: Bytes, size: ImageSize) -> Bytes:
-    """Return the nearest pixels: a mean of two surfaces would lie on neither."""
-    rows, columns = (((np.arange(n) + 0.5) * (m / n)).astype(int) for n, m in zip(size, levels.shape))
-    smaller: Bytes = levels[np.ix_(rows, columns)]
-    return smaller
 
 
 def _first_picture(colors: Bytes, space: ColorSpace) -> bytes:

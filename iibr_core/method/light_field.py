@@ -88,7 +88,7 @@ class ViewMaker:
         nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
         wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
     ) -> Generator[ViewUpdate]:
-        """Yield every view of a grid as it is stored, as the function `generate` does."""
+        """Yield every view of a grid, in the form of storage; see the function `generate`."""
         with suppress(Cancelled):
             nothing = np.zeros(image_size(self._photo), np.bool_)
             yield ViewUpdate(*grid.centre, encode_for_storage(self._photo, is_hdr), self._disparity, nothing)

@@ -10,17 +10,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.color import photo_in_srgb
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
+from iibr_core.types import Camera, ImageSize, ViewUpdate
 from viewer.background.newest import Failed, Newest, Post
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
@@ -144,6 +143,7 @@ class FreeCameraView:
 def _make_ready(request: FreeRequest, is_draft: bool) -> _Ready:
     """Return the photo with all that cameras within the limits see. Raises Cancelled."""
     from iibr_core.beyond.free_cameras import FreeViews, depths_of, inverse_depth_of, steered
+    from iibr_core.formats.maps.resample import nearest_pixels
     from iibr_core.inpainting.background import fill_background
 
     photo, disparity = photo_in_srgb(request.loaded.photo), request.centre.disparity
@@ -155,7 +155,8 @@ def _make_ready(request: FreeRequest, is_draft: bool) -> _Ready:
     if is_draft:
         smaller = math.sqrt(DRAFT_PIXELS / math.prod(photo.size))
         size = ImageSize(*(max(round(smaller * side), 1) for side in photo.size))
-        colors, inverse_depth, camera = _sampled(colors, size), _sampled(inverse_depth, size), camera.resized(size)
+        colors, inverse_depth = nearest_pixels(colors, size), nearest_pixels(inverse_depth, size)
+        camera = camera.resized(size)
     limits = product((-MAX_ASIDE, MAX_ASIDE), (-MAX_ASIDE, MAX_ASIDE), FORWARD_LIMITS)
     corners = [steered(camera, right, down, step * nearest) for right, down, step in limits]
     views = FreeViews(colors, inverse_depth, camera, corners, None if is_draft else fill_background)
@@ -166,6 +167,7 @@ def _make_ready(request: FreeRequest, is_draft: bool) -> _Ready:
 def _view(request: FreeRequest, ready: _Ready) -> ViewUpdate:
     """Return what the camera sees, with the size and the disparities of the scene's views."""
     from iibr_core.beyond.free_cameras import steered
+    from iibr_core.formats.maps.resample import nearest_pixels
     from iibr_core.method.light_field import encode_for_storage
 
     free, centre = request.camera, request.centre
@@ -175,15 +177,9 @@ def _view(request: FreeRequest, ready: _Ready) -> ViewUpdate:
     is_hdr = request.loaded.photo.is_hdr
     colors = encode_for_storage(seen.colors, is_hdr)
     if ready.camera.size != size:
-        shown_px = ScreenSize(size.width, size.height)
-        colors = _sampled(colors, size) if is_hdr else stretch_image(colors.astype(np.uint8, copy=False), shown_px)
-        disparity = _sampled(disparity, size)
+        if is_hdr:
+            colors = nearest_pixels(colors, size)
+        else:
+            colors = stretch_image(colors.astype(np.uint8, copy=False), ScreenSize(size.width, size.height))
+        disparity = nearest_pixels(disparity, size)
     return replace(centre, colors=colors, disparity=disparity.astype(np.float32))
-
-
-def _sampled(image: NDArray[Any], size: ImageSize) -> NDArray[Any]:
-    """Return an image (H, W, ...) at another size by its nearest pixels."""
-    rows, columns = (
-        ((np.arange(there) + 0.5) * (here / there)).astype(int) for there, here in zip(size, image_size(image))
-    )
-    return np.ascontiguousarray(image[rows][:, columns])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import hypot, isfinite
+from math import isfinite
 
 from iibr_core.depth.editing.edits import (
     DEPTH_TOOLS,
@@ -24,9 +24,8 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import with_sections
+from viewer.model.stroke_path import longer_path
 
-POINT_SPACING = 1 / 6
-"""Distance between the points of a stroke, as a share of its radius."""
 MIN_CLIP_GAP = 0.01
 NO_DEPTH_HERE = "The depth of a light field from disk cannot be edited. Open a photo."
 
@@ -85,12 +84,9 @@ def paint(state: AppState, place: tuple[float, float]) -> AppState:
     if state.stroke is None:
         stroke = _first_stroke(state.brush, place)
         return state if stroke is None else replace(state, stroke=stroke)
-    stroke, size = state.stroke, state.scene.size
-    last = stroke.points[-1]
-    step = hypot(place[0] - last[0], (place[1] - last[1]) * size.height / size.width)
-    if step < POINT_SPACING * stroke.radius or len(stroke.points) >= MAX_POINTS:
-        return state
-    return replace(state, stroke=replace(stroke, points=(*stroke.points, place)))
+    stroke = state.stroke
+    points = longer_path(stroke.points, place, stroke.radius, state.scene.size, MAX_POINTS)
+    return state if points is stroke.points else replace(state, stroke=replace(stroke, points=points))
 
 
 def pick(state: AppState, sample: DepthSample) -> AppState:

@@ -22,10 +22,10 @@ from viewer.model.presets import preset_optics, subject_disparity
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import GlossBrush, PresetName, TiltHandles
 from viewer.model.state.viewpoint import Motion
+from viewer.model.stroke_path import longer_path
 
 DEPTH_STRENGTH_LIMIT = 4.0
-POINT_SPACING = 1 / 6
-"""Distance between the points of a gloss stroke, as a share of its radius."""
+
 P = ParamSpec("P")
 
 
@@ -228,9 +228,9 @@ def paint_gloss(state: AppState, place: tuple[float, float], brush: GlossBrush, 
     stroke = GlossStroke((place,), brush.radius, brush.erases)
     if strokes and not begins:
         last = strokes[-1]
-        step = math.hypot(place[0] - last.points[-1][0], (place[1] - last.points[-1][1]) * scene.height / scene.width)
-        if step < POINT_SPACING * last.radius or len(last.points) >= MAX_STROKE_POINTS:
+        points = longer_path(last.points, place, last.radius, scene.size, MAX_STROKE_POINTS)
+        if points is last.points:
             return state
-        strokes, stroke = strokes[:-1], replace(last, points=(*last.points, place))
+        strokes, stroke = strokes[:-1], replace(last, points=points)
     painted = replace(gloss, surface=replace(gloss.surface, strokes=(*strokes, stroke)))
     return replace(state, optics=replace(state.optics, gloss=painted))

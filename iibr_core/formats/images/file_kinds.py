@@ -1,4 +1,4 @@
-"""Kinds of files by their first bytes: pictures, and what is mistaken for them, with advice on what to do instead."""
+"""Kinds of files by their first bytes: pictures, and others that are mistaken for them, each with advice."""
 
 import re
 from collections.abc import Callable

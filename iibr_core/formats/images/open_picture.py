@@ -20,7 +20,7 @@ from iibr_core.formats.images.xmp import text_in, unpack
 from iibr_core.types import ImageSize, InputError
 
 REMEMBERED = 8
-"""Number of files whose headers are kept: a photo's and its maps'; a folder's are looked at once each."""
+"""Number of files whose headers are kept: a photo's and its maps'; those of a folder's pictures are read once each."""
 
 
 class Reader(NamedTuple):
@@ -57,7 +57,7 @@ class OpenPicture:
 
     @cached_property
     def header(self) -> Header:
-        """What the file states about its first picture."""
+        """Header of the first picture."""
         return READERS[self.kind].header(self.path, 0)
 
     @property
@@ -108,7 +108,7 @@ class OpenPicture:
 
 
 def open_picture(path: Path) -> OpenPicture:
-    """Return a file that may be a picture; asked again, what is known of it, unless the file has changed.
+    """Return the record of a file that may be a picture; the same one again, unless the file has changed.
 
     Raises InputError where it is missing, empty, no ordinary file, or cannot be read.
     """

@@ -1,15 +1,17 @@
-"""Disparity maps at another size.
+"""Maps and pictures at another size by their nearest pixels; disparity maps also by surfaces, or smoothly.
 
 Exact maps get no values between foreground and background, which would float in space. Soft maps are enlarged smoothly:
 they hold such values already, and the width of a ramp shows how soft they are.
 """
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.types import FloatImage, ImageSize
+from iibr_core.types import FloatImage, ImageSize, image_size
 
 SURFACE_SHARE = 0.02
 """Smallest difference between surfaces under one filter footprint, as a share of the map's range."""
@@ -22,6 +24,12 @@ MIN_SIDE_PX = 32
 EXACT_SHARE = 0.85
 """Smallest share of a step that an exact map takes from one pixel to the next, as the median of its steps."""
 SAMPLED_VALUES = 100_000
+
+
+def nearest_pixels(image: NDArray[Any], size: ImageSize) -> NDArray[Any]:
+    """Return an image (H, W, ...) at another (height, width) by its nearest pixels, without means of two surfaces."""
+    rows, columns = ((2 * np.arange(n) + 1) * side // (2 * n) for n, side in zip(size, image_size(image)))
+    return np.ascontiguousarray(image[rows][:, columns])
 
 
 def resample_map(values: FloatImage, size: ImageSize, is_at_corners: bool = False) -> FloatImage:
