@@ -9,15 +9,13 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.images.metadata import PictureMetadata
-from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat
 from iibr_core.formats.images.write import write_picture
 from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
@@ -27,6 +25,9 @@ from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
 from iibr_core.types import SRGB, ColorSpace, ViewOffset, ViewUpdate
+
+if TYPE_CHECKING:
+    from iibr_core.formats.images.metadata import PictureMetadata
 
 Item = TypeVar("Item")
 Draw = Callable[[RenderSettings], NDArray[Any]]
@@ -149,8 +150,11 @@ class ExportSource:
         write_picture(path, pixels, form, self.metadata, color_space)
 
     @property
-    def metadata(self) -> PictureMetadata:
+    def metadata(self) -> "PictureMetadata":
         """Exif and XMP of the photo; none of a light field."""
+        from iibr_core.formats.images.metadata import PictureMetadata
+        from iibr_core.formats.images.open_picture import read_metadata
+
         return PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
 
 
