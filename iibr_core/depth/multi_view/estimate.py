@@ -10,7 +10,6 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.matching import FINDING, STEP_PX, MatchingViews, matching_views, sweep
 from iibr_core.depth.multi_view.plain_areas import find_stripes, move_plain_areas_back
 from iibr_core.depth.multi_view.refinement import refine_by_gradients
@@ -89,8 +88,7 @@ def estimate_with_doubt(
         with part_of_job(1, 1, parts):
             is_seen = found.is_plain | left_right_check(views, offsets, reference, values, disparities)
         if is_seen.any():
-            known = np.where(is_seen, values, np.float32(np.nan))
-            values = fill_disparity_by_color(encoded_from_stored(views[reference]), known)
+            values = fill_disparity_by_color(matched.colors, np.where(is_seen, values, np.float32(np.nan)))
     refined = np.clip(refine_by_gradients(matched, values), *range_px)
     report_progress(parts, parts, FINDING)
     return refined, found.is_plain | found.is_striped
@@ -156,12 +154,13 @@ class _Match(NamedTuple):
 def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> _Match:
     """Match every pixel; a median smooths single pixels away."""
     costs = sweep(views, disparities)
-    values, sureness = choose_disparity(costs, views.luma, disparities)
+    is_striped = find_stripes(costs)
+    values, sureness = choose_disparity(costs, views.luma, disparities, is_striped)
     is_plain = move_plain_areas_back(costs, views.colors, disparities, values, len(views.textures))
     image = oiio.ImageBuf(np.ascontiguousarray(values[..., None]))
     median = oiio.ImageBufAlgo.median_filter(image, 5, 5).get_pixels(oiio.FLOAT)
     smooth = np.asarray(median, np.float32).reshape(values.shape)
-    return _Match(smooth, sureness, is_plain, find_stripes(costs))
+    return _Match(smooth, sureness, is_plain, is_striped)
 
 
 def _sample(image: FloatImage, row: FloatImage, column: FloatImage) -> FloatImage:

@@ -40,9 +40,11 @@ SAME_LINE = 0.3
 MAX_TEXTURE_DIFFERENCE = 0.03
 """Difference of texture (1 = white) that costs most: larger ones cost the same."""
 HIDDEN_FACTOR = 1.5
-"""Factor by which one half of the views must match better than all, so that the other half counts as hidden."""
+"""Factor by which a group of the views must match better than all, so that the others count as hidden."""
 HIDDEN_DIFFERENCE = 0.0012
-"""Difference of texture (1 = white) that a hidden half costs at least: outlines of plain objects count by it."""
+"""Difference of texture (1 = white) that a group costs at least: outlines of plain objects count by it."""
+LINE_SINE = 0.3
+"""Sine of the largest angle between the views of one line."""
 MIN_SEEN_SHARE = 0.3
 """Smallest share of the views that must see a place."""
 
@@ -52,11 +54,13 @@ class MatchingViews:
     """A reference view and other views of the same scene.
 
     textures: (N, H, W) float32, the reference first. offsets: (N, 2) float32, (t, s) from the reference in view steps.
-    luma: (H, W) of the reference. colors: (H, W, 3), sRGB-encoded.
+    groups: (G, N), the views of each group; the last one is that of all. luma: (H, W) of the reference. colors: (H, W,
+    3), sRGB-encoded.
     """
 
     textures: NDArray[np.float32]
     offsets: NDArray[np.float32]
+    groups: NDArray[np.bool_]
     luma: FloatImage
     colors: FloatImage
 
@@ -87,7 +91,7 @@ def matching_views(
     textures = np.stack(in_pieces(texture, chosen, tiling.THREADS))
     relative = np.array([offsets[index] for index in chosen], np.float32) - np.array(offsets[reference], np.float32)
     colors = colors_of(views[reference], shrink)
-    return MatchingViews(textures, relative, luma_of(views[reference], shrink), colors)
+    return MatchingViews(textures, relative, view_groups(relative), luma_of(views[reference], shrink), colors)
 
 
 def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
@@ -104,6 +108,18 @@ def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
     chosen = on_rays if len(on_rays) >= min(8, len(others)) else others
     kept = np.linspace(0, len(chosen) - 1, min(len(chosen), MAX_VIEWS)).round().astype(int)
     return [reference, *(chosen[index] for index in kept)]
+
+
+def view_groups(offsets: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return groups of views (G, N) that may see a place that others do not: on one side of the reference, or on one
+    line through it. The last group holds all. offsets: (N, 2), (t, s) from the reference, which is the first.
+    """
+    t, s = offsets.T
+    angle = np.arctan2(t, s)
+    lines = [np.abs(np.sin(angle - at * np.pi / 4)) < LINE_SINE for at in range(4)]
+    everything = np.hypot(t, s) > 0
+    groups = [np.asarray(group) & everything for group in (s < 0, s > 0, t < 0, t > 0, *lines)]
+    return np.stack([*(group for group in groups if group.any() and (group != everything).any()), everything])
 
 
 def luma_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
@@ -133,16 +149,15 @@ def _sums_over_squares(colors: StoredColors, shrink: int) -> tuple[FloatImage, i
 def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return the cost (H, W, D) of each of D disparities at each pixel of the reference: 0 equal, 255 unlike.
 
-    A pixel that some views do not see is matched in one half of them: left, right, upper or lower. Every disparity
-    counts as one step of progress.
+    A pixel that some views do not see is matched in a group of them. Every disparity counts as one step of progress.
     """
     costs = np.empty((*views.luma.shape, len(disparities)), np.uint8)
     window = GuidedFilter(views.luma, WINDOW_RADIUS_PX, WINDOW_SMOOTHNESS)
     steps, reporting = count(1), Lock()
 
     def sweep_one(index: int) -> None:
-        parts = np.empty((5, *views.luma.shape), np.float32)
-        _match(views.textures, views.offsets, disparities[index], parts)
+        parts = np.empty((len(views.groups), *views.luma.shape), np.float32)
+        _match(views.textures, views.offsets, views.groups, disparities[index], parts)
         window.apply(parts)
         _store_costs(parts, costs[:, :, index])
         with reporting:
@@ -153,15 +168,16 @@ def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.
 
 
 @kernel
-def _match(textures, offsets, disparity, parts):
-    """Fill parts with mean square differences at one disparity: to the left, right, upper, lower, and to all views.
+def _match(textures, offsets, groups, disparity, parts):
+    """Fill parts with mean square differences at one disparity to the views of each group; the last one is of all.
 
     All pixels of a row shift alike, so that one instruction compares several of them.
     """
     views, height, width = textures.shape
+    last = len(groups) - 1
     most = np.float32(MAX_TEXTURE_DIFFERENCE**2)
     min_seen = max(np.float32(MIN_SEEN_SHARE * (views - 1)), np.float32(1))
-    sums, counts = np.empty((5, width), np.float32), np.empty((5, width), np.float32)
+    sums, counts = np.empty((last + 1, width), np.float32), np.empty((last + 1, width), np.float32)
     costs = np.empty(width, np.float32)
     for y in range(height):
         sums[:] = 0
@@ -176,37 +192,37 @@ def _match(textures, offsets, disparity, parts):
             down, across = np.float32(row - y0), np.float32(shift - x_shift)
             # Columns that lie in both views; a shift by whole pixels needs no neighbour.
             beside = 1 if across > 0 else 0
-            first, last = max(0, -x_shift), min(width, width - beside - x_shift)
+            first, end = max(0, -x_shift), min(width, width - beside - x_shift)
             upper, lower = textures[view, y0], textures[view, min(y0 + 1, height - 1)]
             upper_left, upper_right = upper[first + x_shift :], upper[first + x_shift + beside :]
             lower_left, lower_right = lower[first + x_shift :], lower[first + x_shift + beside :]
-            reference = textures[0, y, first:last]
+            reference = textures[0, y, first:end]
             for x in range(len(reference)):
                 top = upper_left[x] + (upper_right[x] - upper_left[x]) * across
                 bottom = lower_left[x] + (lower_right[x] - lower_left[x]) * across
                 difference = top + (bottom - top) * down - reference[x]
                 costs[x] = min(difference * difference, most)
-            horizontal = 0 if s < 0 else 1 if s > 0 else -1
-            vertical = 2 if t < 0 else 3 if t > 0 else -1
-            for part in (horizontal, vertical, 4):
-                if part >= 0:
-                    part_sums, part_counts = sums[part, first:last], counts[part, first:last]
-                    for x in range(len(part_sums)):
-                        part_sums[x] += costs[x]
-                        part_counts[x] += np.float32(1)
+            for group in range(last + 1):
+                if groups[group, view]:
+                    group_sums, group_counts = sums[group, first:end], counts[group, first:end]
+                    for x in range(len(group_sums)):
+                        group_sums[x] += costs[x]
+                        group_counts[x] += np.float32(1)
         for x in range(width):
-            is_seen = counts[4, x] >= min_seen
-            mean = sums[4, x] / counts[4, x] if is_seen else most
-            parts[4, y, x] = mean
-            for part in range(4):
-                parts[part, y, x] = sums[part, x] / counts[part, x] if is_seen and counts[part, x] > 0 else mean
+            is_seen = counts[last, x] >= min_seen
+            mean = sums[last, x] / counts[last, x] if is_seen else most
+            for group in range(last + 1):
+                parts[group, y, x] = sums[group, x] / counts[group, x] if is_seen and counts[group, x] > 0 else mean
 
 
 @kernel
 def _store_costs(parts, costs):
-    """Fill costs with the root of the mean over all views, or over a half that is HIDDEN_FACTOR times better."""
+    """Fill costs with the root of the mean over all views, or over a group that is HIDDEN_FACTOR times better."""
+    last = len(parts) - 1
     for y in range(costs.shape[0]):
         for x in range(costs.shape[1]):
-            half = min(min(parts[0, y, x], parts[1, y, x]), min(parts[2, y, x], parts[3, y, x]))
-            square = max(min(parts[4, y, x], max(HIDDEN_FACTOR * half, HIDDEN_DIFFERENCE**2)), np.float32(0))
+            least = parts[last, y, x]
+            for group in range(last):
+                least = min(least, parts[group, y, x])
+            square = max(min(parts[last, y, x], max(HIDDEN_FACTOR * least, HIDDEN_DIFFERENCE**2)), np.float32(0))
             costs[y, x] = np.uint8(255 * min(np.sqrt(square) / np.float32(MAX_TEXTURE_DIFFERENCE), np.float32(1)))

@@ -19,16 +19,18 @@ JUMP_COST = 240
 """Cost of a larger step, where the picture has no edge."""
 EDGE_LUMA = 0.02
 """Edge of the picture (1 = white) at which a jump costs a third."""
+UNREACHED = 30_000
+"""Cost above those of all paths."""
 
 
 def choose_disparity(
-    costs: NDArray[np.uint8], luma: FloatImage, disparities: NDArray[np.float32]
+    costs: NDArray[np.uint8], luma: FloatImage, disparities: NDArray[np.float32], is_striped: NDArray[np.bool_]
 ) -> tuple[FloatImage, FloatImage]:
     """Return the disparity (H, W) that suits each pixel and its neighbours, and its sureness (H, W), 0 .. 1.
 
-    costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1. The result
-    lies between two disparities, at the lowest point of a parabola. A pixel is sure if its disparity costs far less
-    than the mean of all.
+    costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1. is_striped:
+    pixels (H, W) whose edges are those of stripes, not of surfaces. The result lies between two disparities, at the
+    lowest point of a parabola. A pixel is sure if its disparity costs far less than the mean of all.
     """
     directions = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
     halves = np.zeros((2, *costs.shape), np.uint16)
@@ -36,63 +38,61 @@ def choose_disparity(
     def sum_paths(half: int) -> None:
         for down, across in directions[half::2]:
             raise_if_stopped()
-            _add_path(costs, luma, down, across, halves[half])
+            _add_path(costs, luma, is_striped, down, across, halves[half])
 
     in_pieces(sum_paths, range(2), tiling.THREADS)
+    halves[0] += halves[1]
     values, sureness = np.empty(luma.shape, np.float32), np.empty(luma.shape, np.float32)
-    _choose(halves, costs, disparities, values, sureness)
+    _choose(halves[0], costs, disparities, values, sureness)
     return values, sureness
 
 
 @kernel
-def _add_path(costs, luma, down, across, sums):
-    """Add the costs of the cheapest path that comes from one direction (equation 13 of the paper)."""
+def _add_path(costs, luma, is_striped, down, across, sums):
+    """Add the costs of the cheapest path that comes from one direction (equation 13 of the paper).
+
+    Stripes are no edges. Loops over disparities have no branches, so that one instruction takes several of them.
+    """
     height, width, count = costs.shape
-    # Line by line: columns if the path runs along a row, else rows.
-    is_along_row = down == 0
-    lines, places = (width, height) if is_along_row else (height, width)
-    is_forward = across > 0 if is_along_row else down > 0
-    previous, current = np.zeros((places, count), np.float32), np.zeros((places, count), np.float32)
-    previous_min, current_min = np.zeros(places, np.float32), np.zeros(places, np.float32)
-    for step in range(lines):
-        line = step if is_forward else lines - 1 - step
-        for place in range(places):
-            y, x = (place, line) if is_along_row else (line, place)
-            from_y, from_x = y - down, x - across
-            has_previous = from_y >= 0 and from_y < height and from_x >= 0 and from_x < width
-            if has_previous:
-                source = from_y if is_along_row else from_x
-                edge = abs(luma[y, x] - luma[from_y, from_x])
+    previous = np.full((width, count + 2), UNREACHED, np.uint16)
+    current = previous.copy()
+    previous_min, current_min = np.zeros(width, np.uint16), np.zeros(width, np.uint16)
+    for row in range(height):
+        y = height - 1 - row if down < 0 else row
+        before, before_min = (current, current_min) if down == 0 else (previous, previous_min)
+        for column in range(width):
+            x = width - 1 - column if across < 0 else column
+            v, u = y - down, x - across
+            cost, path, total = costs[y, x], current[x], sums[y, x]
+            if v >= 0 and v < height and u >= 0 and u < width:
+                edge = np.float32(0) if is_striped[y, x] and is_striped[v, u] else abs(luma[y, x] - luma[v, u])
                 jump = max(np.float32(STEP_COST), np.float32(JUMP_COST) * np.exp(-edge / np.float32(EDGE_LUMA)))
-                lowest = previous_min[source]
-            least = np.float32(np.inf)
+                source, lowest = before[u], before_min[u]
+                limit = np.uint16(lowest + np.uint16(jump + np.float32(0.5)))
+                for index in range(count):
+                    beside = np.uint16(min(source[index], source[index + 2]) + np.uint16(STEP_COST))
+                    best = min(min(source[index + 1], limit), beside)
+                    path[index + 1] = np.uint16(cost[index] + np.uint16(best - lowest))
+            else:
+                for index in range(count):
+                    path[index + 1] = cost[index]
+            least = path[1]
             for index in range(count):
-                cost = np.float32(costs[y, x, index])
-                if has_previous:
-                    best = min(previous[source, index], lowest + jump)
-                    if index > 0:
-                        best = min(best, previous[source, index - 1] + STEP_COST)
-                    if index < count - 1:
-                        best = min(best, previous[source, index + 1] + STEP_COST)
-                    cost += best - lowest
-                current[place, index] = cost
-                least = min(least, cost)
-                sums[y, x, index] += np.uint16(cost + np.float32(0.5))
-            current_min[place] = least
+                least = min(least, path[index + 1])
+                total[index] = np.uint16(total[index] + path[index + 1])
+            current_min[x] = least
         previous, current = current, previous
         previous_min, current_min = current_min, previous_min
 
 
 @kernel
 def _choose(sums, costs, disparities, values, sureness):
-    """Take the disparity with the lowest sum of both halves, moved to the lowest point of the parabola there."""
+    """Take the disparity with the lowest sum, moved to the lowest point of the parabola there."""
     height, width, count = costs.shape
-    totals = np.empty(count, np.float32)
     for y in range(height):
         for x in range(width):
-            best, mean = 0, np.float32(0)
+            best, mean, totals = 0, np.float32(0), sums[y, x]
             for index in range(count):
-                totals[index] = np.float32(sums[0, y, x, index]) + np.float32(sums[1, y, x, index])
                 mean += costs[y, x, index]
                 if totals[index] < totals[best]:
                     best = index
@@ -100,7 +100,7 @@ def _choose(sums, costs, disparities, values, sureness):
             sureness[y, x] = max(mean - costs[y, x, best], np.float32(0)) / max(mean, np.float32(1))
             values[y, x] = disparities[best]
             if best > 0 and best < count - 1:
-                below, above = totals[best - 1], totals[best + 1]
-                bend = below - 2 * totals[best] + above
+                below, above = np.float32(totals[best - 1]), np.float32(totals[best + 1])
+                bend = below - 2 * np.float32(totals[best]) + above
                 if bend > 0:
                     values[y, x] += (disparities[1] - disparities[0]) * np.float32(0.5) * (below - above) / bend

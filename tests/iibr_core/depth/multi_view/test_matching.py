@@ -12,6 +12,7 @@ from iibr_core.depth.multi_view.matching import (
     MIN_SEEN_SHARE,
     _match,
     _store_costs,
+    view_groups,
 )
 from iibr_core.depth.multi_view.refinement import _apply, _diagonal, _measure, _smooth
 from iibr_core.depth.multi_view.semi_global import EDGE_LUMA, JUMP_COST, STEP_COST, choose_disparity
@@ -39,25 +40,33 @@ def test_the_guided_filter_follows_its_paper():
 
 @pytest.mark.parametrize("disparity", [0.0, 0.4, -1.25, 3.0])
 def test_matching_equals_its_slow_twin(disparity):
-    """Every pixel by itself: its place in each view, the four pixels around that, the mean of each side's views."""
+    """Every pixel by itself: its place in each view, the four pixels around that, the mean of each group's views."""
     rng = np.random.default_rng(1)
     textures = rng.normal(0, 0.02, (9, 7, 8)).astype(np.float32)
     offsets = np.float32([(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1), (1, -1), (-2, 2)])
-    found = np.empty((5, 7, 8), np.float32)
-    _match(textures, offsets, np.float32(disparity), found)
+    groups = view_groups(offsets)
+    found = np.empty((len(groups), 7, 8), np.float32)
+    _match(textures, offsets, groups, np.float32(disparity), found)
     for y, x in np.ndindex(7, 8):
-        costs = []
-        for texture, (t, s) in zip(textures[1:], offsets[1:]):
+        costs = {}
+        for view, (t, s) in enumerate(offsets[1:], 1):
             row, column = y - disparity * t, x - disparity * s
             if 0 <= row <= 6 and 0 <= column <= 7:
-                value = map_coordinates(texture.astype(np.float64), [[row], [column]], order=1)[0]
-                costs.append((t, s, min((value - textures[0, y, x]) ** 2, MAX_TEXTURE_DIFFERENCE**2)))
+                value = map_coordinates(textures[view].astype(np.float64), [[row], [column]], order=1)[0]
+                costs[view] = min((value - textures[0, y, x]) ** 2, MAX_TEXTURE_DIFFERENCE**2)
         is_seen = len(costs) >= MIN_SEEN_SHARE * 8
-        everything = np.mean([cost for *_, cost in costs]) if is_seen else MAX_TEXTURE_DIFFERENCE**2
-        sides = (lambda t, s: s < 0, lambda t, s: s > 0, lambda t, s: t < 0, lambda t, s: t > 0)
-        halves = [[cost for t, s, cost in costs if is_there(t, s)] for is_there in sides]
-        expected = [np.mean(half) if half and is_seen else everything for half in halves]
-        np.testing.assert_allclose(found[:, y, x], [*expected, everything], rtol=1e-4, atol=1e-8)
+        everything = np.mean(list(costs.values())) if is_seen else MAX_TEXTURE_DIFFERENCE**2
+        seen = [[costs[view] for view in np.flatnonzero(group) if view in costs] for group in groups]
+        expected = [np.mean(part) if part and is_seen else everything for part in seen]
+        np.testing.assert_allclose(found[:, y, x], expected, rtol=1e-4, atol=1e-8)
+
+
+def test_groups_are_the_sides_and_lines_that_not_all_views_are_on():
+    grid = np.float32(sorted(product((-2, -1, 0, 1, 2), repeat=2), key=lambda at: np.hypot(*at)))
+    sizes = [group.sum() for group in view_groups(grid)]
+    assert sizes == [10, 10, 10, 10, 4, 4, 4, 4, 24]
+    assert [group.sum() for group in view_groups(np.float32([(0, 0), (0, 1), (0, -1)]))] == [1, 1, 2]
+    assert view_groups(np.float32([(0, 0), (0, 1)])).tolist() == [[False, True]]
 
 
 def test_views_are_hidden_where_the_other_half_matches_much_better():
@@ -71,8 +80,8 @@ def test_views_are_hidden_where_the_other_half_matches_much_better():
     np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_TEXTURE_DIFFERENCE, 1), atol=1.01)
 
 
-def slow_sums(costs, luma):
-    """Return the sums of all paths (equation 13), rounded as they are stored."""
+def slow_sums(costs, luma, is_striped):
+    """Return the sums of all paths (equation 13), with whole costs of jumps."""
     height, width, count = costs.shape
     sums = np.zeros(costs.shape)
     for down, across in (at for at in product((-1, 0, 1), repeat=2) if any(at)):
@@ -86,11 +95,12 @@ def slow_sums(costs, luma):
                 if not (0 <= v < height and 0 <= u < width):
                     continue
                 lowest = paths[v, u].min()
-                jump = max(STEP_COST, JUMP_COST * np.exp(-abs(luma[y, x] - luma[v, u]) / EDGE_LUMA))
+                edge = 0 if is_striped[y, x] and is_striped[v, u] else abs(luma[y, x] - luma[v, u])
+                jump = np.floor(max(STEP_COST, JUMP_COST * np.exp(-edge / EDGE_LUMA)) + 0.5)
                 for d in range(count):
                     beside = [paths[v, u, e] + STEP_COST for e in (d - 1, d + 1) if 0 <= e < count]
                     paths[y, x, d] += min(paths[v, u, d], *beside, lowest + jump) - lowest
-        sums += np.floor(paths + 0.5)
+        sums += paths
     return sums
 
 
@@ -99,8 +109,9 @@ def test_disparities_are_the_cheapest_of_all_paths_and_lie_between_steps():
     costs = rng.integers(0, 256, (7, 9, 6)).astype(np.uint8)
     luma = (0.1 * rng.random((7, 9))).astype(np.float32)
     disparities = np.linspace(-1.0, 1.5, 6).astype(np.float32)
-    values, sureness = choose_disparity(costs, luma, disparities)
-    sums = slow_sums(costs.astype(float), luma.astype(float))
+    is_striped = rng.random((7, 9)) < 0.4
+    values, sureness = choose_disparity(costs, luma, disparities, is_striped)
+    sums = slow_sums(costs.astype(float), luma.astype(float), is_striped)
     inner = 0
     for y, x in np.ndindex(7, 9):
         best = int(np.argmin(sums[y, x]))
