@@ -36,7 +36,7 @@ class DepthOrigin:
     @property
     def line(self) -> str:
         """Return the origin in one line."""
-        return f"Depth: {self.words}."
+        return "No depth." if self.kind == "flat" else f"Depth: {self.words}."
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,12 @@ def without_maps(folders: Iterable[str], has_photos: bool) -> list[str]:
     return shown
 
 
+def middle_picture(path: Path) -> Path:
+    """Return the middle picture of a light field's folder; the path itself if it is no folder or has no pictures."""
+    pictures = in_order(list_photos(str(path)), "name") if path.is_dir() else ()
+    return path / pictures[len(pictures) // 2].name if pictures else path
+
+
 def first_photo(folder: Path) -> Path | None:
     """Return the first photo of a folder, None if the folder is a light field or has no photo."""
     photos = in_order(list_photos(str(folder)), "name")

@@ -37,7 +37,7 @@ from viewer.model import saving
 from viewer.model.action import Action, do
 from viewer.model.carried_optics import carry_optics
 from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import STOPPING, WAITING_FOR_VIEWS, ExportPrompt, JobKind, JobProgress
+from viewer.model.state.prompts import STOPPING, WAITING_FOR_VIEWS, ExportPrompt, JobKind, JobProgress, SavePrompt
 
 Needs = Literal["shown", "photo", "views"]
 """The part of the scene that a job needs: what the window shows now, the photo and its plan, or all its views."""
@@ -51,7 +51,7 @@ class Job:
     """A save, copy or export.
 
     state: of the window when it was asked for. work: writes the file, in a thread. needs, pictures: what it needs of
-    the scene, and the optics of its pictures. prompt: asks for the same export again. generation: number of the views
+    the scene, and the optics of its pictures. prompt: asks for the same file again. generation: number of the views
     that it shows. request: makes them again. snapshot: the views, None before it runs.
     """
 
@@ -61,7 +61,7 @@ class Job:
     work: Callable[[ExportSource], list[Action]]
     needs: Callable[[Scene, Optics], Needs] = lambda scene, optics: "views"
     pictures: Callable[[Scene, Optics], Iterable[Optics]] = lambda scene, optics: (optics,)
-    prompt: ExportPrompt | None = None
+    prompt: ExportPrompt | SavePrompt | None = None
     id: int = 0
     generation: int = 0
     request: SceneRequest | None = None

@@ -270,6 +270,8 @@ class App:
 def run(state: AppState, kept_in: Path | None = None, *actions: Action) -> None:
     """Open the window on this state, take actions, and show it until the user quits. Raises InputError."""
     with interruptions() as signals, closing(App(state, kept_in)) as app:
+        if app.receiver.has_another():
+            app.window.step_aside()
         app.receiver.listen()
         app.do(*actions)
         app.run(signals)

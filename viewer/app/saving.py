@@ -46,11 +46,12 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: Jobs
 
     inputs: files that are read.
     """
-    prompt, scene = task.prompt, state.scene
+    scene = state.scene
     if scene is None:
         return []
+    prompt = saving.in_usual_folder(state, task.prompt)
     try:
-        path = checked_path(task, inputs)
+        path = checked_path(replace(task, prompt=prompt), inputs)
         if prompt.what == "map" and scene.plan is None:
             raise InputError(f"{path}: {NO_MAP}")
         if not task.may_replace and jobs.writes(path):
@@ -58,12 +59,13 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: Jobs
     except InputError as error:
         return [_ask_again(prompt, error)]
     if prompt.what == "map":
-        jobs.add(Job("map", path, state, partial(_save_map, path), lambda scene, optics: "photo"), scene)
+        work = partial(_save_map, path, prompt)
+        jobs.add(Job("map", path, state, work, lambda scene, optics: "photo", prompt=prompt), scene)
         return [do(messages.show_prompt, None)]
     shot = shot_of(state, prompt.size_px, prompt.form)
     needs = partial(_needs, prompt.size_px, state.free_camera is not None)
-    jobs.add(Job("picture", path, state, partial(_save, path, shot, needs), needs), scene)
-    return [do(saving.begin_job, Path(os.path.abspath(path)))]
+    jobs.add(Job("picture", path, state, partial(_save, path, shot, needs, prompt), needs, prompt=prompt), scene)
+    return [do(saving.begin_job, path)]
 
 
 def checked_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
@@ -101,12 +103,13 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
 
     inputs: files that are read.
     """
-    prompt, scene = task.prompt, state.scene
+    scene = state.scene
     if scene is None:
         return []
+    prompt = saving.in_usual_folder(state, task.prompt)
     try:
         kind = export_kind(prompt.kind)
-        path = saving.written_path(kind, os.path.expanduser(prompt.path.strip()), scene, prompt.options)
+        path = saving.written_path(kind, prompt.path, scene, prompt.options)
         _require_another(path, inputs)
         require_export_place(kind, path, inputs, task.may_replace)
         if kind.needs:
@@ -118,7 +121,7 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
     prompt = replace(prompt, options=replace(prompt.options, rack=clicked_rack(state)))
     work, pictures = partial(_export, kind, path, prompt), partial(optics_of, kind, prompt.options)
     jobs.add(Job("export", path, state, work, pictures=pictures, prompt=prompt), scene)
-    return [do(saving.begin_job, Path(os.path.abspath(path)), prompt)]
+    return [do(saving.begin_job, path, prompt)]
 
 
 def _ask_again(prompt: SavePrompt | ExportPrompt, error: InputError) -> Action:
@@ -142,8 +145,8 @@ def _needs(size: ScreenSize, is_as_shown: bool, scene: Scene, optics: Optics) ->
 # In the threads of the jobs
 
 
-def _save(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> list[Action]:
-    return [do(saving.finish_job, _write(path, shot, needs, source))]
+def _save(path: Path, shot: SavedShot, needs: PictureNeeds, prompt: SavePrompt, source: ExportSource) -> list[Action]:
+    return [do(saving.finish_job, _write(path, shot, needs, source), "", prompt)]
 
 
 def _copy(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> list[Action]:
@@ -152,14 +155,14 @@ def _copy(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource
     return [do(messages.notify, Notice("Copied the picture.", is_result=True))]
 
 
-def _save_map(path: Path, source: ExportSource) -> list[Action]:
+def _save_map(path: Path, prompt: SavePrompt, source: ExportSource) -> list[Action]:
     """Save the disparity map with its edits, in pixels per view step as given."""
     from iibr_core.formats.maps.writer import write_map
 
     if source.loaded is None:
         raise InputError(f"{path}: {NO_MAP}")
     report_progress(1, 1, WRITING)
-    return [do(saving.finish_job, path, write_map(path, source.loaded.disparity.values))]
+    return [do(saving.finish_job, path, write_map(path, source.loaded.disparity.values), prompt)]
 
 
 def _export(kind: ExportKind, path: Path, prompt: ExportPrompt, source: ExportSource) -> list[Action]:

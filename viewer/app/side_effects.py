@@ -13,6 +13,7 @@ import typer
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.photo_folder import list_photos
+from iibr_core.formats.outputs import remove_leftovers
 from iibr_core.scenes.scene import source_beside
 from viewer.app.clipboard import paste_picture
 from viewer.app.dialogs import Dialog, ask_for_path, ask_for_place, has_dialogs
@@ -97,7 +98,7 @@ class SideEffects:
             case tasks.PlainTask("read facts", path):
                 self._submit(partial(_read_facts, path))
             case tasks.PlainTask("find recent"):
-                self._submit(lambda: do(opening.set_existing_recent, tuple(filter(os.path.exists, state.recent))))
+                self._submit(partial(_find_recent, state))
             case tasks.PlainTask("list folder", path):
                 self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
             case tasks.SaveTask():
@@ -165,10 +166,19 @@ class SideEffects:
 def _take_path(prompt: PathPrompt, state: AppState) -> list[Action]:
     """Use a typed path; if nothing lies there, keep the prompt and state the problem."""
     path = prompt.path.strip()
-    if not os.path.exists(os.path.expanduser(path)):
+    if path:
+        path = os.path.abspath(os.path.join(os.path.expanduser(_folder_beside(state)), os.path.expanduser(path)))
+    if not os.path.exists(path):
         problem = f"There is no file or folder {path}." if path else "Type a path."
         return [do(messages.show_prompt, replace(prompt, problem=problem))]
     return [do(messages.show_prompt, None), action_for_path(prompt.what, path, state)]
+
+
+def _find_recent(state: AppState) -> Action:
+    """Return the recent files that exist; what killed exports left in the folder used last is removed."""
+    if state.preferences.last_folder:
+        remove_leftovers(Path(state.preferences.last_folder))
+    return do(opening.set_existing_recent, tuple(filter(os.path.exists, state.recent)))
 
 
 def _folder_beside(state: AppState) -> str:

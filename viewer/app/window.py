@@ -26,6 +26,8 @@ from viewer.model.state.stereo import Monitor
 
 WINDOW_SIZE = (1280, 800)
 SMALLEST_SIZE = (200, 150)
+STEP_ASIDE = 32
+"""Distance of a second window from the first, across and down, in screen units."""
 ICON_SIZES_PX = (16, 32, 48)
 
 
@@ -73,6 +75,12 @@ class Window:
             return None
         x, y = glfw.get_window_pos(self.handle)
         return (x, y, *self.size)
+
+    def step_aside(self) -> None:
+        """Move a little, so that the window does not hide another one that opened at the same place."""
+        if not glfw.get_window_attrib(self.handle, glfw.MAXIMIZED):
+            x, y = glfw.get_window_pos(self.handle)
+            glfw.set_window_pos(self.handle, x + STEP_ASIDE, y + STEP_ASIDE)
 
     @property
     def is_fullscreen(self) -> bool:
@@ -231,7 +239,8 @@ def monitor_record(monitor: Any) -> Monitor:
     """Return the record of one of GLFW's monitors."""
     name: Any = glfw.get_monitor_name(monitor)  # bytes: the stub is wrong
     mode = glfw.get_video_mode(monitor)
-    return Monitor(name.decode(errors="replace"), *glfw.get_monitor_pos(monitor), *mode.size)
+    width_mm = glfw.get_monitor_physical_size(monitor)[0]
+    return Monitor(name.decode(errors="replace"), *glfw.get_monitor_pos(monitor), *mode.size, width_mm)
 
 
 def _overlap(place: tuple[int, int, int, int], monitor: Any) -> int:

@@ -44,6 +44,13 @@ class Receiver:
         if self._address:
             self._thread.start()
 
+    def has_another(self) -> bool:
+        """Return whether another window receives paths."""
+        with suppress(OSError):
+            Client(window_address() or "").close()
+            return True
+        return False
+
     def take(self) -> tuple[str, ...] | None:
         """Return the paths that were received since the last call, () without paths; None if nothing was received."""
         return self._received.pop() if self._received else None

@@ -70,10 +70,11 @@ class FilmstripView:
 
 
 def _read(paths: tuple[str, ...], post: Post[ThumbnailRead]) -> None:
+    from iibr_core.exports.photo_folder import middle_picture
     from iibr_core.formats.images.photo import read_thumbnail
 
     for path in paths:
         pixels = None
         with suppress(Exception):  # opening the photo shows what is wrong with it
-            pixels = read_thumbnail(Path(path), MAX_SIZE)
+            pixels = read_thumbnail(middle_picture(Path(path)), MAX_SIZE)
         post((path, pixels))

@@ -21,8 +21,12 @@ class NewDepth:
     in_focus: tuple[float, float] | None = None
 
 
-def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
-    """Return the optics that show a newly planned scene as it was seen before; the usual optics for a new scene."""
+def carry_optics(optics: Optics, old: Scene | None, new: Scene, limits_aperture: bool = True) -> Optics:
+    """Return the optics that show a newly planned scene as it was seen before; the usual optics for a new scene.
+
+    limits_aperture: whether the aperture ends at the widest of the new grid. Optics that are kept for undo are not
+    limited: they may return to a plan like the first.
+    """
     if old is None or old.source is not new.source:  # a file opened again is new
         return Optics()
     eye = ViewOffset(*(x * _steps(b) / _steps(a) for x, a, b in zip(optics.eye, old.grid, new.grid)))
@@ -33,7 +37,9 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
         ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0
         # (given - zero) * scale, for the given disparity that was in focus
         shift = (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
-    aperture = min(optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0]), aperture_limit(new.grid))
+    aperture = optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0])
+    if limits_aperture:
+        aperture = min(aperture, aperture_limit(new.grid))
     return replace(
         optics.with_focus_scaled(ratio),
         eye=clamp_eye(eye, new.grid),
@@ -44,7 +50,12 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
 
 
 def carry_to_depth(
-    optics: Optics, old: Scene, new: Scene, new_depth: NewDepth, focused_at: tuple[float, float] | None
+    optics: Optics,
+    old: Scene,
+    new: Scene,
+    new_depth: NewDepth,
+    focused_at: tuple[float, float] | None,
+    limits_aperture: bool = True,
 ) -> Optics:
     """Return the optics that show a photo with new depth as it was seen before.
 
@@ -54,7 +65,7 @@ def carry_to_depth(
     ratio = (near_now - far_now) / (near - far) if near > far else 1.0
     # nobody chose a focus of 0: it is the plan's and stays 0
     focus = far_now + (optics.focus_disparity - far) * ratio if optics.focus_disparity else 0.0
-    carried = with_focus_of(carry_optics(optics, old, new), optics.with_focus_scaled(ratio))
+    carried = with_focus_of(carry_optics(optics, old, new, limits_aperture), optics.with_focus_scaled(ratio))
     carried = replace(carried, focus_disparity=focus)
     if new_depth.in_focus is None or focused_at is None:
         return carried

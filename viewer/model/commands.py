@@ -146,7 +146,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Photos by name", do(folder.set_order, "name")),
     Command("Photos by time", do(folder.set_order, "time")),
     Command("Share or export…", do(saving.ask_to_export), "ctrl+e"),
-    Command("Exports…", do(messages.show_prompt, "exports")),
+    Command("Saved files…", do(messages.show_prompt, "files")),
     Command("Undo", do(history.undo), "ctrl+z", repeats=True),
     Command("Redo", do(history.redo), "ctrl+shift+z ctrl+y", repeats=True),
     Command("Reset viewpoint, focus and aperture", do(lens.reset), "r"),
@@ -213,9 +213,14 @@ BY_NAME = {command.name: command for command in COMMANDS}
 
 
 def commands_matching(text: str, recent: tuple[Command, ...] = ()) -> tuple[Command, ...]:
-    """Return the commands whose names hold all words of a text, recent commands first."""
+    """Return the commands whose names hold all words of a text, recent commands first; beginnings of words win."""
     words = text.lower().split()
-    return tuple(command for command in (*recent, *COMMANDS) if all(word in command.name.lower() for word in words))
+
+    def is_inside(command: Command) -> bool:
+        return not all(f" {word}" in f" {command.name.lower()}" for word in words)
+
+    found = (command for command in (*recent, *COMMANDS) if all(word in command.name.lower() for word in words))
+    return tuple(sorted(found, key=is_inside))
 
 
 def recent_commands(state: AppState) -> tuple[Command, ...]:

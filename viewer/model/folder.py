@@ -38,7 +38,8 @@ def step(state: AppState, steps: int) -> AppState:
     if source is None or state.folder is None:
         return state
     name = PurePath(source.path).name
-    folder = replace(state.folder, step=1 if steps > 0 else -1, stepped_to=name, scrolled=0)
+    is_walk = state.source is not None and state.folder.is_stepped_to(state.source)
+    folder = replace(state.folder, step=1 if steps > 0 else -1, stepped_to=name, scrolled=0, is_walk=is_walk)
     return opening.open_source(replace(state, folder=folder), source)
 
 

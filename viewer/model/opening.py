@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePath
 
 from iibr_core.beyond.optics import Optics
@@ -92,10 +93,10 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
     if old is not None and is_same and scene.plan is None:
         scene = _with_steady_focus(state, old, scene)
 
-    def carried(optics: Optics) -> Optics:
+    def carried(optics: Optics, limits_aperture: bool = True) -> Optics:
         if new_depth is None or old is None:
-            return carry_optics(optics, old, scene)
-        return carry_to_depth(optics, old, scene, new_depth, state.focused_at)
+            return carry_optics(optics, old, scene, limits_aperture)
+        return carry_to_depth(optics, old, scene, new_depth, state.focused_at, limits_aperture)
 
     shown = replace(
         state,
@@ -105,7 +106,7 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
         stereo=state.stereo if is_same else replace(state.stereo, eyes=None, screen=0.0),
         shown_generation=state.generation,
         optics=carried(state.optics),
-        history=map_optics(state.history, carried),
+        history=map_optics(state.history, partial(carried, limits_aperture=False)),
         chosen_focus=_carried_focus(state.chosen_focus, state.optics, carried),
         focus_before=_carried_focus(state.focus_before, state.optics, carried),
         inspection=replace(state.inspection, probe=None),
@@ -205,15 +206,17 @@ def names_of(paths: Sequence[str]) -> list[str]:
 def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
     """Return the state of a scene that was not open before; nothing of the last one is kept."""
     recent, folder = state.recent, str(PurePath(scene.source.path).parent)
-    if old is not None and state.folder is not None and state.folder.is_stepped_to(scene.source):
+    is_step = state.folder is not None and state.folder.is_stepped_to(scene.source)
+    if old is not None and is_step and state.folder is not None and state.folder.is_walk:
         recent = tuple(path for path in recent if path != old.source.path)  # a walk through a folder leaves one path
+    found = state.inspection.for_next_scene
     if not is_ours(scene.source.path):
         state = replace(state, preferences=replace(state.preferences, opened_folder=os.path.abspath(folder)))
     state = replace(
         state,
         notices=tuple(notice for notice in state.notices if notice.is_result),
         history=History(),
-        inspection=state.inspection.for_next_scene,
+        inspection=found if is_step else replace(found, overlay=None),
         motion=Motion(speed=state.motion.speed),
         recent=with_recent(recent, scene.source.path),
         folder=state.folder if state.folder is not None and state.folder.path == folder else None,

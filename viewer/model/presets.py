@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isclose
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
@@ -37,4 +38,13 @@ def subject_disparity(state: AppState, scene: Scene) -> float:
 def active_preset(state: AppState, scene: Scene) -> PresetName | None:
     """Return the preset that the lens is set to, None if it is set otherwise."""
     optics, subject = state.optics, subject_disparity(state, scene)
-    return next((name for name in PRESETS if preset_optics(name, optics, scene, subject) == optics), None)
+    presets = {name: preset_optics(name, optics, scene, subject) for name in PRESETS}
+    return next((name for name, preset in presets.items() if _is_alike(preset, optics)), None)
+
+
+def _is_alike(one: Optics, other: Optics) -> bool:
+    """Return whether optics are equal but for the rounding that other plans of the scene bring."""
+    numbers = [(each.aperture_diameter, each.focus_disparity, each.focus_range) for each in (one, other)]
+    aperture, focus, focus_range = numbers[0]
+    same = replace(other, aperture_diameter=aperture, focus_disparity=focus, focus_range=focus_range)
+    return same == one and all(isclose(a, b, rel_tol=1e-6, abs_tol=1e-6) for a, b in zip(*numbers))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path, PurePath
+from typing import TypeVar
 
 from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
 from iibr_core.scenes.scene import Scene
@@ -13,11 +15,13 @@ from viewer.model.demo_photo import is_ours
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import ExportPrompt, FinishedExport, JobProgress, Saved, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, FinishedFile, JobProgress, Saved, SavePrompt
 from viewer.model.state.saving import SavedSettings
 
-MAX_FINISHED = 8
-"""Number of finished exports in the list."""
+MAX_FILES = 12
+"""Number of saved and exported files in the list."""
+Asked = ExportPrompt | SavePrompt
+PlacePrompt = TypeVar("PlacePrompt", SavePrompt, ExportPrompt)
 NO_NAME = "There is no name yet. Type one, or press Browse…"
 
 
@@ -42,24 +46,25 @@ def ask_to_export(state: AppState) -> AppState:
     return replace(state, prompt=ExportPrompt(kind, path) if last is None else ExportPrompt(kind, path, last.options))
 
 
-def begin_job(state: AppState, path: Path, prompt: ExportPrompt | None = None) -> AppState:
+def begin_job(state: AppState, path: Path, prompt: Asked | None = None) -> AppState:
     """Close the prompt of a save or export that begins, and remember its folder, kind and options.
 
     path: absolute.
     """
-    preferences, last = replace(state.preferences, last_folder=str(path.parent)), prompt or state.last_export
+    preferences = replace(state.preferences, last_folder=str(path.parent))
+    last = prompt if isinstance(prompt, ExportPrompt) else state.last_export
     shown = None if isinstance(state.prompt, SavePrompt | ExportPrompt) else state.prompt
     return replace(state, preferences=preferences, last_export=last, prompt=shown)
 
 
-def finish_job(state: AppState, path: Path, message: str = "", prompt: ExportPrompt | None = None) -> AppState:
-    """Notify that a file was written; an export enters the list of exports. message: more about the file."""
-    verb = "Saved" if prompt is None else "Exported"
+def finish_job(state: AppState, path: Path, message: str, prompt: Asked) -> AppState:
+    """Notify that a file was written; it enters the list of files. message: more about the file, "" without."""
+    verb = "Exported" if isinstance(prompt, ExportPrompt) else "Saved"
     notice = Notice(f"{verb} {path}. {message}" if message else f"{verb} {path}", is_result=True, path=str(path))
     return _with_finished(notify(state, notice), path, prompt)
 
 
-def fail_job(state: AppState, path: Path, problem: str, prompt: ExportPrompt | None = None) -> AppState:
+def fail_job(state: AppState, path: Path, problem: str, prompt: Asked | None = None) -> AppState:
     """Notify that a file was not written, with the reason."""
     return _with_finished(notify(state, Notice(problem, is_error=True, is_result=True)), path, prompt, problem)
 
@@ -151,6 +156,16 @@ def path_beside(path: str, name: str) -> str:
     return str((PurePath("~") if is_ours(path) else folder) / name)
 
 
+def in_usual_folder(state: AppState, prompt: PlacePrompt) -> PlacePrompt:
+    """Return a prompt whose path is absolute: a bare name belongs to the folder that the prompt began with."""
+    typed = prompt.path.strip()
+    if not typed or state.source is None:
+        return prompt
+    is_map = isinstance(prompt, SavePrompt) and prompt.what == "map"
+    place = path_beside(state.source.path, typed) if is_map else _place_of(state, typed)
+    return replace(prompt, path=os.path.abspath(os.path.expanduser(place)))
+
+
 def _map_path(state: AppState, scene: Scene) -> str:
     """Return the default path of a map: where it is found when the photo is opened again, unless a map was given."""
     is_given = scene.depth_origin is not None and scene.depth_origin.kind == "file"
@@ -164,7 +179,7 @@ def _place_of(state: AppState, name: str) -> str:
     return str(PurePath(folder) / name) if folder else path_beside(state.source.path, name)
 
 
-def _with_finished(state: AppState, path: Path, prompt: ExportPrompt | None, problem: str = "") -> AppState:
+def _with_finished(state: AppState, path: Path, prompt: Asked | None, problem: str = "") -> AppState:
     if prompt is None:
         return state
-    return replace(state, exports=(FinishedExport(str(path), prompt, problem), *state.exports)[:MAX_FINISHED])
+    return replace(state, files=(FinishedFile(str(path), prompt, problem), *state.files)[:MAX_FILES])

@@ -111,10 +111,15 @@ def eye_distance(scene: Scene, stereo: Stereo) -> float:
     """Return the distance of the eyes in view steps: the chosen one, else the largest that eyes bear, or for a display
     with tens of pictures that from the first to the last.
     """
-    limit, plane = eye_distance_limit(scene), screen_plane(scene, stereo)
-    farthest = max(*(abs(edge - plane) for edge in scene.disparity_range_px), 1e-6)
-    usual = limit if stereo.display else MAX_PARALLAX * scene.width / farthest
+    limit = eye_distance_limit(scene)
+    usual = limit if stereo.display else MAX_PARALLAX / parallax_of_a_view(scene, stereo)
     return clamp(usual if stereo.eyes is None else stereo.eyes, 0.0, limit)
+
+
+def parallax_of_a_view(scene: Scene, stereo: Stereo) -> float:
+    """Return the largest parallax of eyes one view step apart, as a share of the picture's width, above 0."""
+    plane = screen_plane(scene, stereo)
+    return max(*(abs(edge - plane) for edge in scene.disparity_range_px), 1e-6) / scene.width
 
 
 def screen_plane(scene: Scene, stereo: Stereo) -> float:

@@ -11,8 +11,11 @@ from viewer.model.state.app_state import AppState, DrawReport
 
 
 def set_fullscreen(state: AppState, is_fullscreen: bool) -> AppState:
-    """Fill the screen with the window, or stop that."""
-    return replace(state, is_fullscreen=is_fullscreen)
+    """Fill the screen with the picture, or stop that; Tab shows the panel."""
+    if is_fullscreen == state.is_fullscreen:
+        return state
+    hides_panel = None if is_fullscreen else state.hid_panel
+    return replace(state, is_fullscreen=is_fullscreen, hides_panel=hides_panel, hid_panel=state.hides_panel)
 
 
 def toggle_panel(state: AppState) -> AppState:

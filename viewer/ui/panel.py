@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from iibr_core.runtime.time_left import about_left
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, source_beside
-from viewer.model import opening, preferences
+from viewer.model import messages, opening, preferences
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
@@ -25,7 +25,7 @@ from viewer.ui.sections import (
     stereo_section,
     view_section,
 )
-from viewer.ui.widgets import button, gap, heading, in_row, label, quiet, scale, tooltip
+from viewer.ui.widgets import button, gap, heading, in_row, label, last_part, quiet, scale, tooltip
 
 TOOLS = (
     (f"{icons.ICON_FA_IMAGE}  Open", "Open a photo…"),
@@ -41,6 +41,7 @@ MORE_TOOLS = (
     (f"{icons.ICON_FA_FOLDER_OPEN}  Folder", "Open a folder…"),
     (f"{icons.ICON_FA_CIRCLE_HALF_STROKE}  Theme", "Light or dark"),
 )
+START_TOOLS = (MORE_TOOLS[1], TOOLS[5])
 READY = "Ready"
 HINT = "Drag the picture to look around it, click to focus."
 FLAT_HINT = "All of it is equally far away, so nothing moves."
@@ -64,13 +65,12 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.begin("panel", None, _FIXED)
-    actions = _tools(TOOLS, state)
+    is_empty = state.scene is None and not progress_text(state.progress)  # the start page has all that can be done
+    actions = _tools(START_TOOLS if is_empty else TOOLS, state)
     if state.scene is not None:
         actions += _picture(state, state.scene)
     elif progress_text(state.progress):
         actions += _progress(state)
-    else:
-        actions += _tools(MORE_TOOLS, state)
     imgui.end()
     return actions
 
@@ -83,7 +83,12 @@ def _picture(state: AppState, scene: Scene) -> list[Action]:
     gap()
     actions += essentials.essentials(state, scene)
     gap()
-    quiet(HINT if aperture_limit(scene.grid) else FLAT_HINT)
+    if state.files:  # who saves knows the hint
+        latest = last_part(state.files[0].path)
+        if button("Saved files…###files", f"{latest} and others that were saved or exported"):
+            actions.append(do(messages.show_prompt, "files"))
+    else:
+        quiet(HINT if aperture_limit(scene.grid) else FLAT_HINT)
     gap()
     for section in SECTIONS:
         actions += _section(section, state, scene)
@@ -196,7 +201,19 @@ def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
     is_open = section in sections
     is_toggled = heading(section.capitalize(), is_open)
     toggled: list[Action] = [do(preferences.toggle_section, section)] if is_toggled else []
-    return toggled + (BUILDERS[section](state, scene) if is_open else [])
+    top = imgui.get_cursor_pos_y()
+    actions = toggled + (BUILDERS[section](state, scene) if is_open else [])
+    _show_whole(section, is_open, top)
+    return actions
+
+
+def _show_whole(section: Section, is_open: bool, top: float) -> None:
+    """Scroll to a section that was just opened, as far as its heading stays in sight. top: of its content."""
+    before, key, row = imgui.get_state_storage(), imgui.get_id(f"open {section}"), imgui.get_frame_height_with_spacing()
+    wanted_y = imgui.get_cursor_pos_y() + row - imgui.get_window_height()
+    if is_open and not before.get_bool(key, True) and wanted_y > imgui.get_scroll_y():
+        imgui.set_scroll_y(min(top - row, wanted_y))
+    before.set_bool(key, is_open)
 
 
 def _more(state: AppState, scene: Scene) -> list[Action]:

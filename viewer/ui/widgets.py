@@ -5,6 +5,7 @@ Sliders and checkboxes return their value, changed or not. `scale` is the size o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TypeVar
 
@@ -20,6 +21,8 @@ LABEL_WIDTH = 104.0
 SPACING = 4.0
 """Distance of buttons in a row at usual size, in window units."""
 TOOLTIP_WIDTH = 260.0
+TRACK_HEIGHT = 3.0
+"""Height of a slider's track at usual size, in window units."""
 
 
 def scale() -> float:
@@ -54,10 +57,25 @@ def slider(
     imgui.begin_disabled(not is_enabled)
     label(text, tip)
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if is_logarithmic else 0)
+    for which in (imgui.Col_.slider_grab, imgui.Col_.slider_grab_active):
+        imgui.push_style_color(which, 0)
     is_changed, new = imgui.slider_float(f"##{text}", value, *limits, form, flags)
+    imgui.pop_style_color(2)
+    low, high, at = (math.log(max(number, 1e-9)) for number in (*limits, new)) if is_logarithmic else (*limits, new)
+    _draw_track((at - low) / (high - low) if high > low else 0.0)
     imgui.end_disabled()
     tooltip(tip)
     return float(new) if is_changed else value
+
+
+def _draw_track(share: float) -> None:
+    """Draw how far a slider is along the lower edge of the last item, so that its number stays legible."""
+    first, last, room = imgui.get_item_rect_min(), imgui.get_item_rect_max(), TRACK_HEIGHT * scale()
+    color = imgui.get_color_u32(imgui.Col_.check_mark)
+    x = first.x + min(max(share, 0.0), 1.0) * (last.x - first.x - 2 * room) + 2 * room
+    draw, top = imgui.get_window_draw_list(), imgui.ImVec2(first.x, last.y - room)
+    draw.add_rect_filled(top, imgui.ImVec2(x, last.y), color, room / 2)
+    draw.add_rect_filled(imgui.ImVec2(x - 2 * room, last.y - 2 * room), imgui.ImVec2(x, last.y), color, room / 2)
 
 
 def percent_slider(
@@ -171,8 +189,11 @@ def gap(units: float = 2.0) -> None:
 
 
 def tooltip(text: str) -> None:
-    """Show words while the pointer rests on the last item: beside the item's window, so that no widget is hidden."""
-    if not text or not imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+    """Show words while the pointer rests on the last item: beside the item's window, so that no widget is hidden. None
+    are shown while something is pressed or dragged.
+    """
+    flags = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
+    if not text or imgui.is_mouse_down(0) or not imgui.is_item_hovered(flags):
         return
     window, size, item = imgui.get_window_pos(), imgui.get_window_size(), imgui.get_item_rect_min()
     screen, space = imgui.get_io().display_size, SPACING * scale()

@@ -13,6 +13,7 @@ from concurrent.futures import Future
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, cast
+from urllib.parse import urlsplit
 
 from iibr_core.depth.models.known import KnownModel
 from iibr_core.formats.files import reason_of
@@ -55,9 +56,13 @@ def download(model: KnownModel) -> None:
     except (Cancelled, InputError):
         raise
     except Exception as error:  # whatever the library's clients raise: they change with its versions
-        kind = NoConnectionError if _is_offline(error) else FixableError
-        message = f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has arrived is kept"
-        raise kind(message, Remedy.DOWNLOAD) from error
+        from huggingface_hub import constants
+
+        if _is_offline(error):
+            message = f"{model.title} cannot be downloaded: {urlsplit(constants.ENDPOINT).netloc} cannot be reached"
+            raise NoConnectionError(f"{message}; what has arrived is kept", Remedy.DOWNLOAD) from error
+        message = f"{model.title} cannot be downloaded ({reason_of(error)[:120]}); what has arrived is kept"
+        raise FixableError(message, Remedy.DOWNLOAD) from error
 
 
 def _is_offline(error: BaseException | None) -> bool:

@@ -136,5 +136,5 @@ def test_other_bytes_than_the_hub_states_are_refused(hub) -> None:
 
 def test_a_hub_without_the_model_is_one_line(hub) -> None:
     hub.commit = "f" * 40
-    with pytest.raises(InputError, match=rf"^{MODEL.repository} cannot be downloaded \(404[^\n]*$"):
+    with pytest.raises(InputError, match=rf"^{MODEL.title} cannot be downloaded \(404[^\n]*$"):
         catalog.fetch(MODEL)

@@ -188,7 +188,7 @@ def test_the_list_of_exports_cancels_each_and_repeats_one(
     start(viewer, tmp_path / "a.gif")
     for name in "bc":
         app.do(export("gif", tmp_path / f"{name}.gif"))
-    app.do(do(messages.show_prompt, "exports"))
+    app.do(do(messages.show_prompt, "files"))
     viewer.until(lambda app: len(app.state.jobs) == 3)
     for index, left in ((1, ["a.gif", "c.gif"]), (0, ["c.gif"])):
         viewer.until_idle()

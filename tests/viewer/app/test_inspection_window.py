@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
@@ -92,6 +93,13 @@ def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver)
     viewer.until(lambda app: app.layout().status is not None)
     viewer.press("Depth")
     viewer.until(lambda app: app.state.inspection.overlay == "disparity")
+    viewer.find("##Opacity")
+    viewer.send("mousedown", 1)
+    viewer.until(lambda app: imgui.is_any_item_active())
+    viewer.app.step()
+    tip = imgui.internal.find_window_by_name("##Tooltip_00")
+    assert tip is None or not tip.active, "the picture is what matters while a slider is dragged"
+    viewer.send("mouseup", 1)
     viewer.slide("##Opacity", 0.25)
     assert 0.1 < viewer.app.state.inspection.opacity < 0.4
     viewer.press("Entropy")

@@ -153,7 +153,7 @@ def test_without_a_connection_a_download_says_so_with_details(viewer: Driver, mo
     viewer.press(GET, "notices")
     viewer.until(lambda app: any(notice.text == OFFLINE for notice in app.state.notices))
     viewer.press("Details", "notices")
-    viewer.until(lambda app: MODEL.repository in app.state.notices[-1].text)
+    viewer.until(lambda app: "127.0.0.1:9 cannot be reached" in app.state.notices[-1].text)
     assert viewer.app.state.models.downloading is None
 
 

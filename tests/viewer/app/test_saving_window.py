@@ -132,6 +132,30 @@ def test_enter_replaces_no_photo_and_a_failure_is_an_error(
         assert texts(viewer) == [f"Saved {path}"]
 
 
+@pytest.mark.usefixtures("no_dialogs")
+def test_a_bare_name_goes_to_the_folder_that_the_field_showed_and_stays_in_the_list(
+    viewer: Driver, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also after an error, for which the field keeps the cursor."""
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    viewer.app.do(do(saving.ask_to_save))
+    viewer.until_idle()
+    for name in (" small.xyz", " small.png"):
+        viewer.type(name)
+        viewer.send("key", "Return")
+        viewer.until_idle()
+    viewer.until(lambda app: bool(app.state.files))
+    saved = photo_path.with_name("small.png")
+    assert viewer.app.state.files[0].path == str(saved)
+    assert texts(viewer) == [f"Saved {saved}"]
+    viewer.app.do(do(messages.dismiss))
+    viewer.press("###files")
+    viewer.until(lambda app: app.state.prompt == "files")
+    viewer.until_idle()
+    viewer.find("Show in folder##0", "prompt str")
+
+
 def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path) -> None:
     """The photo, the map beside it, an aperture: a reason, and no question whether to replace it."""
     shutil.copy(photo_path, photo_path.with_name("mask.png"))

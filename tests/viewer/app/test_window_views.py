@@ -19,8 +19,10 @@ def test_f11_fills_the_screen_and_escape_comes_back_to_where_it_was(viewer: Driv
     viewer.until(lambda app: app.window.is_fullscreen and app.window.size == (1400, 900))
     viewer.until_idle()
     assert viewer.app.state.preferences.window == place, "a place to come back to"
+    assert viewer.app.layout().panel.width == 0
     viewer.send("key", "Escape")
     viewer.until(lambda app: not app.window.is_fullscreen and app.window.size == SMALL_WINDOW[2:])
+    assert viewer.app.layout().panel.width > 0
     assert not viewer.app.state.should_quit
 
 

@@ -67,6 +67,7 @@ def test_one_of_two_windows_listens_and_the_other_after_it_although_a_killed_one
     with closing(listening()) as first:
         hand_over_when_heard("/a.png")
         with closing(listening()) as second:
+            assert second.has_another()
             assert first.take() == ("/a.png",)
             assert second.take() is None
             first.close()
@@ -74,6 +75,7 @@ def test_one_of_two_windows_listens_and_the_other_after_it_although_a_killed_one
             assert second.take() == ("/b.png",)
             assert first.take() is None
     assert not hand_over(["/c.png"])
+    assert not Receiver(lambda: None).has_another()
 
 
 def test_a_window_that_waits_to_listen_closes_at_once_and_never_listens(receiver: Receiver) -> None:

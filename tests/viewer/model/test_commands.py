@@ -72,3 +72,8 @@ def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path: str) -
     assert isinstance(saved, SavePrompt)
     assert isinstance(exported, ExportPrompt)
     assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-web.html")
+
+
+def test_commands_with_a_word_that_begins_so_come_first() -> None:
+    names = [command.name for command in commands_matching("entr")]
+    assert names.index("Overlay: entropy") < names.index("Centre the head")

@@ -10,7 +10,7 @@ from iibr_core.exports.photo_folder import FolderPhoto, in_order
 from iibr_core.scenes.scene import Source
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import scene_of
-from viewer.model import folder, opening
+from viewer.model import folder, inspection, opening
 from viewer.model.action import do
 from viewer.model.folder import AHEAD, filmstrip_range, photos_ahead
 from viewer.model.state.app_state import AppState
@@ -61,14 +61,18 @@ def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
 def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
     state = replace(state_at("img_9.jpg"), recent=("/other/a.jpg", "/other/b.jpg"))
     state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg"))))
+    state = reduce(state, do(inspection.set_overlay, "disparity"))
     for _ in range(2):
         state = reduce(state, do(folder.step, 1))
         assert state.source is not None
         state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
-    assert state.recent == ("/photos/IMG_11.jpg", "/other/a.jpg", "/other/b.jpg")
+    assert state.inspection.overlay == "disparity", "one may look through a folder's depth"
+    opened = ("/photos/img_9.jpg", "/other/a.jpg", "/other/b.jpg")
+    assert state.recent == ("/photos/IMG_11.jpg", *opened), "what was opened by name stays"
     state = reduce(state, do(opening.open_source, Source("/photos/img_9.jpg")))
     state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=Source("/photos/img_9.jpg"))))
     assert state.recent[:2] == ("/photos/img_9.jpg", "/photos/IMG_11.jpg")
+    assert state.inspection.overlay is None
 
 
 def test_a_photo_that_does_not_open_is_told_once_and_passed_by() -> None:

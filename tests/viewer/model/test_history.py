@@ -7,12 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.beyond.optics import CENTRE
+from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import gesture, history, lens, opening
 from viewer.model.action import Action, do
+from viewer.model.presets import active_preset
 from viewer.model.state.app_state import AppState
 
 values = st.floats(0, 3)
@@ -98,3 +100,19 @@ def test_edits_before_another_plan_are_undone_in_its_units() -> None:
     state = reduce(state, do(opening.show_scene, state.generation, scene_of(plan=old)))
     assert state.optics.focus_disparity == pytest.approx(0.25)
     assert reduce(state, do(history.undo)).optics.focus_disparity == pytest.approx(1.0)
+
+
+def test_undoing_depth_strength_brings_the_widest_aperture_and_its_preset_back() -> None:
+    """The grid of views follows the depth, and with it the widest aperture."""
+    few, many = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(13, 13), scale=1.0)
+    before = scene_of(plan=few)
+    state = after(state_with(before), do(lens.apply_preset, "portrait"), do(gesture.end_gesture))
+    wanted = state.optics.aperture_diameter
+    state = after(state, do(lens.set_depth_strength, 2.0, True), do(gesture.end_gesture))
+    wider = scene_of(GridShape(13, 13), plan=many, disparity_range_px=(-4.0, 6.0))
+    state = reduce(state, do(opening.show_scene, state.generation, wider))
+    assert state.optics.aperture_diameter == aperture_limit(wider.grid)
+    state = reduce(state, do(history.undo))
+    state = reduce(state, do(opening.show_scene, state.generation, before))
+    assert state.optics.aperture_diameter == pytest.approx(wanted)
+    assert active_preset(state, before) == "portrait"

@@ -20,7 +20,7 @@ from viewer.model.state.inspection import Inspection
 from viewer.model.state.lens import GlossBrush, TiltHandles
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
-from viewer.model.state.prompts import ExportPrompt, FinishedExport, JobProgress, Prompt
+from viewer.model.state.prompts import ExportPrompt, FinishedFile, JobProgress, Prompt
 from viewer.model.state.stereo import Monitor, Stereo
 from viewer.model.state.tasks import Task
 from viewer.model.state.viewpoint import FreeCamera, Motion, Tracking, Zoom
@@ -78,9 +78,9 @@ class AppState:
     free_camera: None in the plane of the views; free_progress: share of its preparation, None once done. depth:
     refinement and edits; stroke: of the brush while it is drawn. chosen_focus: disparity that the user chose for this
     scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
-    of the one before. hides_panel: None to follow the window. shows_before: whether the unchanged photo is shown.
-    tracking: None unless the viewpoint follows the head.
-    monitors: the connected ones, that of the window first.
+    of the one before. hides_panel: None to follow the window; hid_panel: the same before full screen. shows_before:
+    whether the unchanged photo is shown. tracking: None unless the viewpoint follows the head. files: saved and
+    exported in this run, the latest first. monitors: the connected ones, that of the window first.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -114,7 +114,7 @@ class AppState:
     gloss_brush: GlossBrush = field(default_factory=GlossBrush)
     jobs: tuple[JobProgress, ...] = ()
     quits_when_done: bool = False
-    exports: tuple[FinishedExport, ...] = ()
+    files: tuple[FinishedFile, ...] = ()
     last_export: ExportPrompt | None = None
     models: DepthModels = field(default_factory=DepthModels)
     chosen_focus: float | None = None
@@ -127,6 +127,7 @@ class AppState:
     facts: PhotoFacts = field(default_factory=lambda: PhotoFacts(""))
     is_fullscreen: bool = False
     hides_panel: bool | None = None
+    hid_panel: bool | None = None
     is_narrow: bool = False
     shows_before: bool = False
     tracking: Tracking | None = None
@@ -154,8 +155,9 @@ class AppState:
 
     @property
     def is_panel_hidden(self) -> bool:
-        """Whether the panel is hidden: by the user, or because the window is narrow or shows a stereo picture."""
-        return self.is_narrow or self.stereo.fills_window if self.hides_panel is None else self.hides_panel
+        """Whether the panel is hidden: by the user, or in a narrow window, full screen or on a stereo picture."""
+        has_no_room = self.is_narrow or self.is_fullscreen or self.stereo.fills_window
+        return has_no_room if self.hides_panel is None else self.hides_panel
 
     def with_tasks(self, *tasks: Task) -> AppState:
         """Return the state with more tasks for the outside world."""

@@ -13,7 +13,8 @@ from iibr_core.scenes.scene import Source
 class PhotoFolder:
     """A folder and its photos in order.
 
-    step: direction of the last step, 1 or -1; stepped_to: name of the photo that it asked for, "" before the first.
+    step: direction of the last step, 1 or -1; stepped_to: name of the photo that it asked for, "" before the first;
+    is_walk: whether the photo before was stepped to, too.
     scrolled: number of photos by which the filmstrip was moved. unreadable: names of photos that did not open; steps
     pass them by.
     """
@@ -22,6 +23,7 @@ class PhotoFolder:
     photos: tuple[FolderPhoto, ...]
     step: int = 1
     stepped_to: str = ""
+    is_walk: bool = False
     scrolled: int = 0
     unreadable: frozenset[str] = frozenset()
 

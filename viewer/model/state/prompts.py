@@ -62,8 +62,8 @@ class PalettePrompt:
     selected: int = 0
 
 
-PlainPrompt = Literal["help", "about", "quit", "exports"]
-"""quit: whether to close although jobs are under way. exports: the list of exports."""
+PlainPrompt = Literal["help", "about", "quit", "files"]
+"""quit: whether to close although jobs are under way. files: the list of saved and exported files."""
 Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | PlainPrompt
 
 JobKind = Literal["picture", "map", "copy", "export"]
@@ -95,9 +95,9 @@ class JobProgress:
 
 
 @dataclass(frozen=True)
-class FinishedExport:
-    """An export that was written or failed. prompt: asks for the same again. problem: why it failed."""
+class FinishedFile:
+    """A picture, map or export that was written or failed. prompt: asks for the same again. problem: why it failed."""
 
     path: str
-    prompt: ExportPrompt
+    prompt: ExportPrompt | SavePrompt
     problem: str = ""

@@ -15,13 +15,14 @@ STEREO_MODES: tuple[StereoMode, ...] = get_args(StereoMode)
 
 @dataclass(frozen=True)
 class Monitor:
-    """A monitor by name, its place and its size in screen units."""
+    """A monitor by name, its place and its size in screen units. width_mm: 0 if it does not state that."""
 
     name: str
     x: int
     y: int
     width: int
     height: int
+    width_mm: int = 0
 
     @property
     def words(self) -> str:

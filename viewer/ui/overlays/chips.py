@@ -15,7 +15,7 @@ from viewer.ui.style import DARK
 from viewer.ui.widgets import scale, tooltip
 
 CHIP, BADGE = "free camera", "Depth guessed"
-FULL, SHORT = "Free camera: parts are synthesized here. C returns", "Free camera. C returns"
+FULL, SHORT = "Free camera: the photo does not show all of this. C returns", "Free camera. C returns"
 AT_END = "The photo shows nothing beyond this. C returns"
 GUESS_TIP = "Depth is guessed, so near and far may be wrong. Press to get better depth."
 GAP = 8.0

@@ -61,10 +61,10 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     """Draw the prompt; return the actions of the user."""
     assert state.scene is not None
     imgui.text("Share or export")
-    if state.exports or state.jobs:
+    if state.files or state.jobs:
         imgui.same_line()
-        if imgui.small_button("Exports…"):
-            return [do(messages.show_prompt, "exports")]
+        if imgui.small_button("Saved files…"):
+            return [do(messages.show_prompt, "files")]
     gap()
     chosen = _kind_rows(prompt.kind)
     if chosen == PICTURE:
@@ -77,7 +77,7 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     if kind.is_light_field:
         label("Views", "Set the number of views with `iibr generate PHOTO --grid`.")
         imgui.text(f"{scene.grid.rows} x {scene.grid.columns} of {scene.width} x {scene.height} pixels")
-    row_of_path = place_row("File" if kind.endings else "Folder", prompt.path, state)
+    row_of_path = place_row("File" if kind.endings else "Folder", prompt.path, state, prompt.problem)
     written = _written_name(kind, edited, scene)
     if written and written != Path(prompt.path.strip()).name:
         quiet(f"The file name becomes {written}{', for programs that read it.' if kind.path else '.'}")

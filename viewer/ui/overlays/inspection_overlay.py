@@ -21,6 +21,7 @@ from viewer.ui.style import DARK, Color, corners, draw_words, pack_color, palett
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
 BLACK: Color = (0.0, 0.0, 0.0, 1.0)
+NO_ENTROPY = "0 everywhere: this view is the photo itself. Drag to look from elsewhere."
 
 
 def draw_inspection(state: AppState, scene: Scene, layout: Layout, textures: InspectionTextures) -> None:
@@ -73,6 +74,8 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
         draw_words("inpainting" if state.selection is None else "selected surface", x, y, scale)
         return
     draw, line = imgui.get_background_draw_list(), imgui.get_text_line_height()
+    if kind == "entropy" and view_near(state.optics.eye, scene.grid) == scene.grid.centre:
+        draw_words(NO_ENTROPY, x, y + LEGEND_HEIGHT * scale + line + 4 * room, scale)
     bar = Rect(x + room, y + room, LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale)
     if bar.x + bar.width + room > frame.x + frame.width:
         return

@@ -16,7 +16,7 @@ from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.prompts import (
     ChoiceOf,
     ExportPrompt,
-    FinishedExport,
+    FinishedFile,
     JobProgress,
     PalettePrompt,
     PathPrompt,
@@ -104,8 +104,8 @@ def _contents(prompt: Prompt, state: AppState) -> list[Action]:
             return models_prompt(prompt, state)
         case PalettePrompt():
             return _palette(prompt, state)
-        case "exports":
-            return _exports(state)
+        case "files":
+            return _files(state)
         case "quit":
             return _quit(state)
         case "about":
@@ -119,7 +119,7 @@ def _path(prompt: PathPrompt, state: AppState) -> list[Action]:
     """Draw a field for the path of a file or folder."""
     imgui.text(PATH_WORDS[prompt.what])
     gap()
-    row = rows.place_row("Path", prompt.path, replace(state, has_dialogs=False))
+    row = rows.place_row("Path", prompt.path, replace(state, has_dialogs=False), prompt.problem)
     edited = prompt if row.path == prompt.path else replace(prompt, path=row.path, problem="")
     rows.say_problem(edited.problem, state)
     pressed, closed = rows.prompt_buttons("Open")
@@ -128,25 +128,24 @@ def _path(prompt: PathPrompt, state: AppState) -> list[Action]:
     return rows.prompt_actions(closed, edited, prompt)
 
 
-def _exports(state: AppState) -> list[Action]:
-    """Draw the exports that run and those that are done."""
-    imgui.text("Exports")
+def _files(state: AppState) -> list[Action]:
+    """Draw the saves and exports that run, and the files that are written."""
+    imgui.text("Saved files")
     gap()
-    running = job_rows([job for job in state.jobs if job.kind == "export"])
-    if not running and not state.exports:
-        quiet("Nothing was exported yet.")
+    running = job_rows([job for job in state.jobs if job.kind != "copy"])
+    if not running and not state.files:
+        quiet("Nothing was saved or exported since the window opened.")
     actions = build_rows(running)
-    for number, finished in enumerate(state.exports):
+    for number, finished in enumerate(state.files):
         gap()
         actions += _finished(finished, number)
     gap()
     return [*actions, *rows.button_rows([("Close", do(messages.show_prompt, None))])]
 
 
-def _finished(finished: FinishedExport, number: int) -> list[Action]:
+def _finished(finished: FinishedFile, number: int) -> list[Action]:
     imgui.text(last_part(finished.path))
-    if finished.problem:
-        quiet(finished.problem)
+    quiet(finished.problem or finished.path)
     again = do(messages.show_prompt, replace(finished.prompt, already_there=False, problem=""))
     offers: list[tuple[str, Action]] = [] if finished.problem else rows.file_offers(finished.path, number)
     return rows.button_rows([*offers, (f"Again…##{number}", again)])

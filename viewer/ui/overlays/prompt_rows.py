@@ -53,10 +53,16 @@ class PlaceRow(NamedTuple):
     browses: bool
 
 
-def place_row(text: str, path: str, state: AppState) -> PlaceRow:
-    """Draw a row for a path, which shows its end if it is long; with a button where the system has dialogs."""
+def place_row(text: str, path: str, state: AppState, problem: str = "") -> PlaceRow:
+    """Draw a row for a path, which shows its end if it is long; with a button where the system has dialogs. The field
+    has the keys when the prompt or a problem appears.
+    """
     style = imgui.get_style()
     width = imgui.calc_text_size(BROWSE).x + 2 * style.frame_padding.x + style.item_spacing.x
+    before, key = imgui.get_state_storage(), imgui.get_id("problem")
+    if problem and not before.get_bool(key):
+        imgui.set_keyboard_focus_here(0)
+    before.set_bool(key, bool(problem))
     focus_on_appearing()
     label(text)
     imgui.set_next_item_width(-width if state.has_dialogs else -1)

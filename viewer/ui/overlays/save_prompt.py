@@ -18,7 +18,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
 from viewer.ui.overlays.prompt_rows import place_actions, place_row, size_row
-from viewer.ui.widgets import gap, label, quiet
+from viewer.ui.widgets import gap, label, quiet, slider
 
 Option = TypeVar("Option")
 PICTURE_ENDINGS = "The ending of the name sets the format: png, jpg, tif, webp, avif or exr (HDR)."
@@ -30,7 +30,7 @@ def save_prompt(prompt: SavePrompt, state: AppState) -> list[Action]:
     is_map = prompt.what == "map"
     imgui.text("Save the depth map" if is_map else "Save the picture")
     gap()
-    row, edited = place_row("File", prompt.path, state), prompt
+    row, edited = place_row("File", prompt.path, state, prompt.problem), prompt
     if not is_map and state.scene is not None:
         edited = _form_rows(_with_size(prompt, state.scene), state.scene)
     quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
@@ -53,8 +53,8 @@ def _form_rows(prompt: SavePrompt, scene: Scene) -> SavePrompt:
     if form.bits not in kind.bits:
         form = replace(form, bits=None)  # of another format, typed before
     if kind.has_quality:
-        label("Quality", "Lower quality makes a smaller file with less detail.")
-        form = replace(form, quality=imgui.slider_int("##quality", form.quality, 1, BEST_QUALITY)[1])
+        tip = "Lower quality makes a smaller file with less detail."
+        form = replace(form, quality=round(slider("Quality", form.quality, (1, BEST_QUALITY), "%.0f", tip)))
     if len(kind.bits) > 1:
         label("Bits", "Bits per colour channel. 16 keep smooth skies smooth in later edits.")
         usual = form.bits or kind.bits[0]

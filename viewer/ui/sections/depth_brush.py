@@ -63,7 +63,7 @@ def _settings(brush: Brush) -> Brush:
         ),
     )
     has_sample = paints and is_depth_tool and brush.sample is not None
-    return replace(edited, sample=None) if button("Forget the picked depth", SAMPLE_TIP, has_sample) else edited
+    return replace(edited, sample=None) if button("Clear the picked depth", SAMPLE_TIP, has_sample) else edited
 
 
 def selection_rows(state: AppState) -> list[Action]:

@@ -51,6 +51,13 @@ FAR_TIP = "Bring everything farther than this to this depth. The left handle abo
 NEAR_TIP = "Push everything nearer than this to this depth. The right handle above does the same."
 GAMMA_TIP = "Above 1, near things stand out more; below 1, far things do."
 NEAR_END_TIP = "Values of the map that count as near. Invert swaps near and far."
+ENDS = ("the high end", "the low end"), ("white", "black")
+END_WORDS = {
+    "the high end": "Large values of the map are",
+    "the low end": "Small values of the map are",
+    "white": "White in the map is",
+    "black": "Black in the map is",
+}
 INVERT_TIP = "Swap near and far, for maps that count the other way round."
 COLORS_TIP = "Depth over the picture as colours (D): the lighter, the nearer."
 OPEN_TIP = "Open a depth map for this photo: PFM, EXR, NPY or 16-bit PNG."
@@ -63,7 +70,8 @@ ESTIMATES_TIP = "Estimate the depth of photos without depth with the model that 
 def depth_line(scene: Scene) -> None:
     """Build one line about the source of depth, with a tooltip about failures."""
     origin = scene.depth_origin
-    quiet(origin.line if origin is not None else f"Depth: {scene.depth_source}.")
+    without = "No depth." if scene.depth_source == "none" else f"Depth: {scene.depth_source}."
+    quiet(origin.line if origin is not None else without)
     if origin is not None:
         tooltip("\n".join((*origin.failures, BETTER_DEPTH) if origin.is_poor else origin.failures))
 
@@ -96,8 +104,8 @@ def _notes(state: AppState, scene: Scene) -> None:
         imgui.bullet()
         quiet(failure)
     if origin.near:
-        end = origin.near if not state.depth.edits.is_inverted else "the other end"
-        quiet(f"Near in the map: {end}.")
+        far = next(other for pair in ENDS for end, other in (pair, pair[::-1]) if end == origin.near)
+        quiet(f"{END_WORDS[far if state.depth.edits.is_inverted else origin.near]} near.")
         tooltip(NEAR_END_TIP)
 
 

@@ -9,7 +9,7 @@ from viewer.model import stereo
 from viewer.model.action import Action, ask, do
 from viewer.model.commands import STEREO_WORDS
 from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES
+from viewer.model.state.stereo import STEREO_MODES, Monitor
 from viewer.model.state.tasks import PlainTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, checkbox, colored, combo, edit, label, slider
@@ -18,8 +18,8 @@ MONITOR_TIP = "Display that shows the stereo picture, full screen."
 WINDOW, WINDOW_TIP = "This window", "The window itself shows the picture, full screen; Tab shows the panel over it."
 MODE_TIP = "Arrangement of both eyes' pictures that the display or the glasses expect."
 LENTICULAR = "Looking Glass", "a lenticular display that Looking Glass Bridge knows"
-EYES_TIP = "Distance of the eyes in view steps. A larger distance gives more depth."
-SCREEN_TIP = "Disparity of what lies in the plane of the screen. Nearer things stand before it."
+EYES_TIP = "How far the pictures of both eyes lie apart at most. More gives more depth; eyes bear 3 % of the width."
+SCREEN_TIP = "Depth that lies in the plane of the screen. Nearer things stand before it."
 SHOW_TIP = "Show the stereo picture (3). Esc closes it."
 FOCUS_TIP = "Put what is in focus into the plane of the screen."
 SWAP_TIP = "Give each eye the picture of the other (L)."
@@ -42,9 +42,12 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
         actions.append(do(stereo.set_mode, STEREO_MODES[picked]) if is_pair else do(ask, PlainTask("find display")))
     eyes, plane = stereo.eye_distance(scene, shown), stereo.screen_plane(scene, shown)
     limits = 0.0, stereo.eye_distance_limit(scene)
-    actions += edit(stereo.set_eyes, eyes, slider("Eye distance", eyes, limits, "%.2f views", EYES_TIP))
-    edited = slider("Screen plane", plane, scene.disparity_range_px, "%.2f px", SCREEN_TIP)
-    actions += edit(stereo.set_screen, plane, edited)
+    if state.preferences.units == "light field":
+        actions += edit(stereo.set_eyes, eyes, slider("Eye distance", eyes, limits, "%.2f views", EYES_TIP))
+        edited = slider("Screen plane", plane, scene.disparity_range_px, "%.2f px", SCREEN_TIP)
+        actions += edit(stereo.set_screen, plane, edited)
+    else:
+        actions += _parallax(state, scene, wanted) + _plane(scene, plane)
     if warning := stereo.warning(scene, shown):
         colored(warning, imgui.ImVec4(*palette_of(state.preferences.theme).warning))
     swaps = checkbox("Swap the eyes", is_swapped, SWAP_TIP) != is_swapped
@@ -54,3 +57,20 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     imgui.same_line()
     word = "Close" if shown.is_shown else "Show"
     return actions + ([do(stereo.show, not shown.is_shown)] if button(f"{word}###show stereo", SHOW_TIP) else [])
+
+
+def _parallax(state: AppState, scene: Scene, monitor: Monitor | None) -> list[Action]:
+    """Build the slider of the eye distance: the largest parallax, in per cent of the width and, if known, in cm."""
+    eyes, a_view = stereo.eye_distance(scene, state.stereo), stereo.parallax_of_a_view(scene, state.stereo)
+    percent, limit = 100 * a_view * eyes, 100 * a_view * stereo.eye_distance_limit(scene)
+    size = f" · {percent / 1000 * monitor.width_mm:.1f} cm" if monitor is not None and monitor.width_mm else ""
+    new = slider("Eye distance", percent, (0.0, limit), f"%.1f %% of width{size}", EYES_TIP)
+    return [do(stereo.set_eyes, new / 100 / a_view)] if new != percent else []
+
+
+def _plane(scene: Scene, plane: float) -> list[Action]:
+    """Build the slider of the plane of the screen, from near to far as the focus."""
+    far, near = scene.disparity_range_px
+    percent = 100 * (near - plane) / (near - far) if near > far else 0.0
+    new = slider("Screen plane", percent, (0.0, 100.0), "near  ·  %.0f %%  ·  far", SCREEN_TIP)
+    return [do(stereo.set_screen, near - new / 100 * (near - far))] if new != percent else []

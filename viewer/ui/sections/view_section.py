@@ -37,11 +37,14 @@ def view_section(state: AppState, scene: Scene) -> list[Action]:
     imgui.begin_group()
     actions += _beside_pad(state)
     imgui.end_group()
-    speed = slider("Speed", motion.speed, SPEED_LIMITS, "%.2f turns/s", SPEED_TIP, is_logarithmic=True)
-    actions += edit(viewpoint.set_speed, motion.speed, speed)
+    fastest, slowest = (1 / speed for speed in SPEED_LIMITS[::-1])
+    seconds = slider("Speed", 1 / motion.speed, (fastest, slowest), "%.1f s a round", SPEED_TIP, is_logarithmic=True)
+    actions += [do(viewpoint.set_speed, 1 / seconds)] if seconds != 1 / motion.speed else []
     if farthest := dolly_limit(scene.grid):
-        edited = slider("Dolly", dolly, (-farthest, farthest), "%+.2f views", DOLLY_TIP)
-        actions += edit(lens.set_dolly, dolly, edited)
+        is_in_views = state.preferences.units == "light field"
+        step, form = (1.0, "%+.2f views") if is_in_views else (farthest / 100, "%+.0f %%")
+        edited = slider("Dolly", dolly / step, (-farthest / step, farthest / step), form, DOLLY_TIP)
+        actions += [do(lens.set_dolly, edited * step)] if edited != dolly / step else []
     return actions + _head_rows(state)
 
 
