@@ -61,6 +61,8 @@ def read_given_views(scene: MultiView) -> list[GivenView]:
     Raises InputError if a file cannot be read, no disparity can be found, or memory does not suffice.
     """
     grid, (size, views) = grid_of(scene), read_views(scene)
+    if len(scene.views) < math.prod(grid):
+        raise InputError(f"{scene.place}: only {len(scene.views)} of {math.prod(grid)} views are there; get the others")
     what = f"making views between {grid.columns}x{grid.rows} of {scene.name} ({size})"
     require_memory(math.prod(size) * math.prod(grid) * VIEW_BYTES, what)
     read: list[ViewUpdate] = []

@@ -4,7 +4,6 @@ A kind of export is a function that writes one file or folder from an `ExportSou
 pictures wherever the graphics card may be used.
 """
 
-import math
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -93,7 +92,7 @@ class ExportSource:
         if static_disparity is not None:
             moved = (self.plan().disparity_zero - static_disparity) * self.plan().disparity_scale
             scene = replace(scene, infinity_px=(scene.infinity_px or 0.0) + moved)
-        total = math.prod(scene.grid) if wanted is None else len({*wanted, CENTRE})
+        total = scene.view_count if wanted is None else len({*wanted, CENTRE})
         for done, view in enumerate(add_gloss(views, self.optics.gloss, scene), 1):
             raise_if_stopped()
             report_progress(done, total, MAKING)

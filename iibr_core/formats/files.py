@@ -71,9 +71,9 @@ def stays_within(name: str) -> bool:
 
 
 def entries_of(folder: Path) -> list[Path]:
-    """Return all in a folder, by name."""
+    """Return all in a folder, by name, but hidden files, such as those that macOS adds to foreign disks (`._a.png`)."""
     try:
-        return sorted(folder.iterdir())
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({reason_of(error)}); change its permissions") from error
 

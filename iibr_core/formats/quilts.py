@@ -22,10 +22,13 @@ MAX_USUAL_SIDE_PX = 4096
 MAX_VIEWS = 1024
 MIN_ASPECT = 0.01
 TAG = re.compile(
-    rf"_qs(\d{{1,6}})x(\d{{1,6}})a(\d{{1,6}}(?:\.\d{{0,9}})?)(?:z[\d.]+)?(?:f-?[\d.]+)?(?:[-_]\d{{1,6}})?{COPY}$",
+    r"(?:_qs|(?:quilt|light[-_ ]?field)[-_ ]?)(\d{1,6})x(\d{1,6})"
+    rf"(?:a(\d{{1,6}}(?:\.\d{{0,9}})?))?(?:z[\d.]+)?(?:f-?[\d.]+)?(?:[-_]\d{{1,6}})?{COPY}$",
     re.IGNORECASE,
 )
-"""End of the stem of a quilt's name: columns, rows and aspect; then zoom, focus, number of a frame or copy."""
+"""End of the stem of a quilt's name: columns and rows, and aspect where pixels are not square; then zoom, focus, number
+of a frame or copy.
+"""
 
 
 @dataclass(frozen=True)
@@ -88,11 +91,12 @@ def quilt_named(path: Path, size: ImageSize) -> Quilt | None:
     match = TAG.search(path.stem)
     if match is None:
         return None
-    columns, rows, aspect = int(match[1]), int(match[2]), float(match[3])
+    columns, rows = int(match[1]), int(match[2])
     if not (1 <= columns <= size.width and 1 <= rows <= size.height):
         raise InputError(f"{path}: {size} pixels are too few for {columns}x{rows} views; is its name right?")
     if columns * rows > MAX_VIEWS:
         raise InputError(f"{path}: {columns}x{rows} are more than {MAX_VIEWS} views; is its name right?")
+    aspect = float(match[3]) if match[3] else (size.width // columns) / (size.height // rows)
     if not MIN_ASPECT <= aspect <= 1 / MIN_ASPECT:
         raise InputError(f"{path}: a view has no width / height of {aspect:g}; is its name right?")
     return Quilt(columns, rows, size, aspect)

@@ -85,7 +85,7 @@ def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | Non
     else:
         for view in chain((centre,), views):
             read.append(view)
-            report_progress(len(read), math.prod(grid), READING)
+            report_progress(len(read), len(field.views), READING)
     if given is None and centre.disparity is None:
         yield from _with_found_disparity(scene, field, read, takes_drafts)
         return
@@ -104,7 +104,7 @@ def _offsets_of(field: MultiView, views: Sequence[ViewUpdate]) -> list[ViewOffse
 
 def open_field(source: Source) -> MultiView:
     """Return the light field of a source, in the order that is known of it."""
-    return _in_known_order(open_light_field(Path(source.path)), source)
+    return _in_known_order(open_light_field(Path(source.path), source.arrangement), source)
 
 
 def _in_known_order(field: MultiView, source: Source) -> MultiView:
@@ -119,7 +119,7 @@ def is_order_known(field: MultiView, source: Source) -> bool:
 
 def open_settled(source: Source) -> tuple[MultiView, tuple[str, ...]]:
     """Return a light field in its right order, found from its views where it is not known, and notes."""
-    field = open_light_field(Path(source.path))
+    field = open_light_field(Path(source.path), source.arrangement)
     if is_order_known(field, source):
         return _in_known_order(field, source), field.notes
     settled = settle(field, _read_all(field), source.arrangement)
@@ -131,7 +131,7 @@ def find_disparity(source: Source) -> tuple[str, FloatImage, tuple[str, ...]]:
 
     Of a pair it is that of the left view.
     """
-    field = open_light_field(Path(source.path))
+    field = open_light_field(Path(source.path), source.arrangement)
     read = _read_all(field)
     report_progress(0, 0, FINDING)
     settled, values, note = _with_disparity_of(settle(field, read, source.arrangement, is_left=True))
@@ -252,6 +252,7 @@ def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_p
         width=width,
         height=height,
         grid=grid_of(field),
+        missing_views=math.prod(grid_of(field)) - len(field.views),
         row_step=row_step_of(field),
         disparity_range_px=range_px or UNKNOWN_DISPARITY_RANGE_PX,
         depth_source="light field" if centre.disparity is not None else "none",

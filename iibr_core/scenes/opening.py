@@ -151,7 +151,7 @@ def _count_views(
     time_left, begun_s = TimeLeft(), time.perf_counter()
     for there, view in enumerate(views, 1):
         chosen = wanted()
-        total = scene.grid.rows * scene.grid.columns if chosen is None else len({*chosen, ViewOffset(0.0, 0.0)})
+        total = scene.view_count if chosen is None else len({*chosen, ViewOffset(0.0, 0.0)})
         left_s, seconds = time_left.update(there, total), time.perf_counter() - begun_s
         if view.is_final:
             progress = Progress(there, total, seconds, share=there / total, left_s=left_s)

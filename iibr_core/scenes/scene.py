@@ -81,7 +81,8 @@ class Scene:
     infinity_px: field disparity of infinitely far points, None where a light field does not state it. is_sketch:
     whether it is a small picture that is shown while the photo is read. found_span_px: range of the field disparity
     before edits, None if it cannot be edited. arrangement: order of the views of a light field, as far as it was found.
-    row_step: distance between its rows, in distances between columns.
+    row_step: distance between its rows, in distances between columns. missing_views: number of places of the grid that
+    have no view, as in a star.
     """
 
     source: Source
@@ -110,6 +111,12 @@ class Scene:
     found_span_px: float | None = None
     arrangement: Arrangement = UNKNOWN
     row_step: float = 1.0
+    missing_views: int = 0
+
+    @property
+    def view_count(self) -> int:
+        """Number of views."""
+        return self.grid.rows * self.grid.columns - self.missing_views
 
     @property
     def is_guessed(self) -> bool:

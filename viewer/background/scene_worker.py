@@ -66,8 +66,5 @@ class SceneWork:
 
         with watch_compiling(lambda words: report(0, 0, words)), watched(report):
             for result in results_of(request, lambda: self.eye):
-                if isinstance(result, ViewReady):
-                    views = result.progress
-                else:
-                    views = Progress(total=result.scene.grid.rows * result.scene.grid.columns)
+                views = result.progress if isinstance(result, ViewReady) else Progress(total=result.scene.view_count)
                 post(result)

@@ -258,7 +258,7 @@ class SceneView:
 
     @property
     def _has_all_views(self) -> bool:
-        return self._scene is not None and sum(self._is_final.values()) == math.prod(self._scene.grid)
+        return self._scene is not None and sum(self._is_final.values()) == self._scene.view_count
 
     def _note_views(self, optics: Optics) -> None:
         """Keep which views the picture that is begun will show, and whether all of them are there and final."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +44,12 @@ MAX_SKEW = 0.2
 """Largest tangent of the angle between the axes of a grid and those of the picture."""
 MIN_MEASURED = 4
 """Fewest measured views that decide between orders, unless there are fewer."""
-EQUAL_STEPS = 0.06
-"""Largest difference of the distances between rows and between columns that may be an error of measuring."""
+EQUAL_STEPS, EQUAL_STATED_STEPS = 0.06, 0.25
+"""Largest difference of the distances between rows and between columns that may be an error of measuring, of any names
+and of a layout whose rows usually stand as far apart as columns.
+"""
+Verdict = Literal["clear", "silent", "contrary"]
+"""What parallax says about the order of views: one, nothing, or that none fits."""
 
 
 @dataclass(frozen=True)
@@ -59,18 +64,21 @@ class Fit:
     measured: int
 
 
-def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangement = UNKNOWN) -> Fit | None:
-    """Return the arrangement that the parallax of the views shows, None if it shows nothing.
+def find_order(
+    scene: MultiView, views: Sequence[StoredColors], given: Arrangement = UNKNOWN
+) -> tuple[Fit | None, Verdict]:
+    """Return the arrangement that the parallax of the views shows, None if it shows none, and what it says.
 
     views: colours (H, W, 3) of each view of the scene. given: what the user has decided. Its flip is a first guess: the
-    names' own, or rows from bottom to top. Raises InputError if the views contradict every order and none is given.
+    names' own, or rows from bottom to top. Raises InputError if the views contradict every order, and neither the user
+    nor the layout states one.
     """
     possible, numbers = possible_arrangements(scene, given), numbers_of(scene)
     places = [places_in(numbers, arrangement) for arrangement in possible]
     reference = scene.centre
     chosen = _views_to_measure(places, reference)
     if not chosen:
-        return None
+        return None, "silent"
     found = _measure([views[k] for k in (reference, *chosen)])
     fits = [
         fit
@@ -78,9 +86,13 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
         if (fit := _fit(arrangement, np.array([at[k] for k in chosen], float) - at[reference], found)) is not None
     ]
     if fits:
-        return _with_flip(min(fits, key=lambda fit: round(fit.stray, 1)), given)
-    if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)) or given.order is not None:
-        return None
+        fit = _with_flip(min(fits, key=lambda fit: round(fit.stray, 1)), scene, given)
+        is_told = scene.is_stated and given == UNKNOWN
+        return (None, "silent") if is_told and fit.measured < len(chosen) / 2 else (fit, "clear")
+    if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)):
+        return None, "silent"
+    if scene.is_stated or given.order is not None:
+        return None, "contrary"
     if scene.is_guess:
         raise FixableError(
             f"{scene.place}: holds no light field, or in an unusual order: the parallax of its {len(views)} numbered"
@@ -165,10 +177,11 @@ def _fit(arrangement: Arrangement, places: NDArray[np.float64], found: Viewpoint
     return Fit(arrangement, (float(axes[0, 0]), float(axes[1, 1])), stray, len(places))
 
 
-def _with_flip(fit: Fit, given: Arrangement) -> Fit:
+def _with_flip(fit: Fit, scene: MultiView, given: Arrangement) -> Fit:
     """Return the fit with the flip that its steps suggest, and the distance of rows."""
     down, across = fit.steps
-    flip: Flip = given.flip or ("y" if down * across < 0 else "none")
+    flip: Flip = given.flip or fit.arrangement.flip or ("y" if down * across < 0 else "none")
     ratio = abs(down / across) if down and across else 1.0
-    row_step = 1.0 if abs(ratio - 1) <= EQUAL_STEPS else round(ratio, 3)
+    equal = EQUAL_STATED_STEPS if scene.is_stated else EQUAL_STEPS
+    row_step = 1.0 if abs(ratio - 1) <= equal else round(ratio, 3)
     return replace(fit, arrangement=replace(fit.arrangement, flip=flip, row_step=row_step))

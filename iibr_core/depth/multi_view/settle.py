@@ -11,9 +11,9 @@ import numpy as np
 from iibr_core.depth.multi_view.estimate import CoarseDisparity, estimate_coarse
 from iibr_core.depth.multi_view.matching import luma_of
 from iibr_core.depth.multi_view.near_side import nearness_ratio
-from iibr_core.depth.multi_view.order_by_parallax import find_order, views_around
+from iibr_core.depth.multi_view.order_by_parallax import Fit, Verdict, find_order, views_around
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given
+from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given, is_quilt
 from iibr_core.formats.light_fields.views import grid_of, in_order_of, view_offsets
 from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import FloatImage, ViewOffset, ViewUpdate, image_size
@@ -34,9 +34,19 @@ FLIP_WORDS = {
     "y": "rows run from bottom to top",
     "xy": "rows run from bottom to top and columns from right to left, as seen from behind",
 }
+TILE_WORDS = {
+    "none": "",
+    "x": "tiles are counted from the bottom right",
+    "y": "tiles are counted from the top left",
+    "xy": "tiles are counted from the top right",
+}
 
 UNSURE = "Near and far may be exchanged, as little hides anything behind it: flip both axes to turn them round."
-UNTESTED = "The views are taken in the order of their names: too little of them is found again in others to test it."
+DOUBTS: dict[Verdict, str] = {
+    "clear": "",
+    "silent": "The views are taken in {order}: too little of them is found again in others to test it.",
+    "contrary": "The views are taken in {order}, though their parallax fits none: if depth looks wrong, try another.",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +54,9 @@ class Settled:
     """A light field in the right order.
 
     views: all views, the centre and those near it first. offsets: their viewpoints from it. coarse: its disparity.
-    arrangement: the order, UNKNOWN where the layout is sure of it. measured: number of views that show the order.
-    is_sure: whether near and far cannot be exchanged. named: the field in the order of its names.
+    arrangement: the order, UNKNOWN where the layout is sure of it. measured: number of views that show the order, 0 if
+    they do not. verdict: what parallax says of it. is_sure: whether near and far cannot be exchanged. named: the field
+    in the order of its names.
     """
 
     field: MultiView
@@ -56,6 +67,7 @@ class Settled:
     measured: int
     is_sure: bool
     named: MultiView
+    verdict: Verdict = "clear"
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -73,7 +85,10 @@ def settle(
     contradict every order, or are too small for their disparity to be found.
     """
     ordered = in_order_of(field, views)
-    fit = find_order(field, [view.colors for view in ordered], given) if field.numbers or given != UNKNOWN else None
+    fit: Fit | None = None
+    verdict: Verdict = "clear"
+    if field.numbers or given != UNKNOWN:
+        fit, verdict = find_order(field, [view.colors for view in ordered], given)
     if fit is None and field.is_guess and given.order is None:
         raise FixableError(
             f"{field.place}: holds no light field; its {len(views)} numbered pictures do not look like views from a"
@@ -82,7 +97,7 @@ def settle(
         )
     if fit is None:
         order = UNKNOWN if given == UNKNOWN else as_given(field, given)
-        return _placed(field, ordered, order, 0, is_sure=True, is_left=is_left)
+        return replace(_placed(field, ordered, order, 0, is_sure=True, is_left=is_left), verdict=verdict)
     settled = _placed(field, ordered, fit.arrangement, fit.measured, is_sure=given.flip is not None)
     return settled if settled.is_sure else _faced(settled, settled.coarse.values, CLEAR_RATIO)
 
@@ -132,26 +147,37 @@ def _faced(settled: Settled, values: FloatImage, clear_ratio: float) -> Settled:
     if ratio >= 1 / clear_ratio:
         return replace(settled, is_sure=ratio > clear_ratio)
     ordered = in_order_of(settled.field, settled.views)
-    return _placed(settled.named, ordered, _turned(settled.arrangement), settled.measured, is_sure=True)
+    return _placed(settled.named, ordered, _turned(settled), settled.measured, is_sure=True)
 
 
-def _turned(arrangement: Arrangement) -> Arrangement:
+def _turned(settled: Settled) -> Arrangement:
     """Return the arrangement seen from behind."""
+    arrangement = settled.arrangement
     assert arrangement.grid is not None
-    axes = {axis for axis, length in zip("yx", arrangement.grid) if length > 1}
+    is_all = _is_tiled(settled)
+    axes = {axis for axis, length in zip("yx", arrangement.grid) if length > 1 or is_all}
     flips: dict[str, Flip] = {flip: flip for flip in FLIPS}
     return replace(arrangement, flip=flips["".join(sorted(axes ^ (set("xy") & set(arrangement.flip or "")))) or "none"])
+
+
+def _is_tiled(settled: Settled) -> bool:
+    """Return whether the views are one line, counted along the tiles of a quilt."""
+    return is_quilt(settled.named) and settled.arrangement.grid == settled.named.grid
 
 
 def _notes_on_order(settled: Settled) -> tuple[str, ...]:
     """Return a sentence about an order, none if it is that of the names."""
     found, named, words = settled.arrangement, settled.named, []
     is_folder = named.place != named.views[0].path  # a quilt states its order
-    if found.grid is None:
-        return (UNTESTED,) if named.numbers and is_folder else ()
+    if settled.measured == 0 or found.grid is None:
+        doubt = DOUBTS[settled.verdict].format(
+            order="the order of their names" if found == UNKNOWN else "the given order"
+        )
+        return (doubt,) if doubt and (is_folder or settled.verdict == "contrary") else ()
     if named.is_guess or found.grid != named.grid:
         words.append(f"{found.grid.rows} rows of {found.grid.columns}" if min(found.grid) > 1 else "one line of views")
-    words += filter(None, (ORDER_WORDS[found.order or "rows"], FLIP_WORDS[found.flip or "none"]))
+    flips = TILE_WORDS if _is_tiled(settled) else FLIP_WORDS
+    words += filter(None, (ORDER_WORDS[found.order or "rows"], flips[found.flip or "none"]))
     if found.row_step not in (None, 1.0):
         words.append(f"rows are {found.row_step:.2g} times as far apart as columns")
     order = f"The parallax of {settled.measured} views shows their order: {', '.join(words)}." if words else ""

@@ -72,10 +72,13 @@ def measure_viewpoints(
 ) -> Viewpoints:
     """Return the viewpoints of views (H, W), luma of 0 .. 1, that are alike in size."""
     reference, *others = map(_smooth, (reference, *others))
+    reach, light = max(round(search_share * max(reference.shape)), 2), _light(reference)
     points = find_corners(reference)
+    unique = np.empty(len(points), np.bool_)
+    _are_unique(reference, points, reach, unique)
+    points = points[unique]
     if len(points) < MIN_POINTS:
         return Viewpoints(np.full((len(others), 2), np.nan), np.zeros(len(others)))
-    reach, light = max(round(search_share * max(reference.shape)), 2), _light(reference)
 
     def find(other: FloatImage) -> Doubles:
         found = np.empty((len(points), 2))
@@ -136,37 +139,67 @@ def _box_mean(values: FloatImage, radius: int) -> Doubles:
 @kernel
 def _find_points(reference, other, points, reach, found):
     """Fill found with the shift (down, across) of each point, to a part of a pixel; NaN where it is in doubt."""
-    radius, (height, width) = PATCH_RADIUS_PX, reference.shape
+    radius = PATCH_RADIUS_PX
     side = 2 * radius + 1
     worst, outside = np.float32(side**2 * MAX_PATCH_DIFFERENCE**2), np.float32(side**2)
     costs = np.empty((2 * reach + 1, 2 * reach + 1), np.float32)
     for k in range(len(points)):
         top, left = points[k, 0] - radius, points[k, 1] - radius
         found[k] = np.nan
-        costs[:] = outside
+        _fill_costs(reference, other, top, left, reach, worst, costs)
         best, best_y, best_x = outside, 0, 0
-        for y in range(max(top - reach, 0), min(top + reach, height - side) + 1):
-            for x in range(max(left - reach, 0), min(left + reach, width - side) + 1):
-                cost = np.float32(0)
-                for row in range(side):
-                    for column in range(side):
-                        difference = reference[top + row, left + column] - other[y + row, x + column]
-                        cost += difference * difference
-                    if cost > worst:
-                        break
-                costs[y - top + reach, x - left + reach] = cost
-                if cost < best:
-                    best, best_y, best_x = cost, y - top + reach, x - left + reach
-        if not (best <= worst and 0 < best_y < 2 * reach and 0 < best_x < 2 * reach):
-            continue
-        second = outside
         for row in range(2 * reach + 1):
             for column in range(2 * reach + 1):
-                if abs(row - best_y) > radius or abs(column - best_x) > radius:
-                    second = min(second, costs[row, column])
-        if best <= np.float32(MAX_SECOND) * second:
+                if costs[row, column] < best:
+                    best, best_y, best_x = costs[row, column], row, column
+        if not (best <= worst and 0 < best_y < 2 * reach and 0 < best_x < 2 * reach):
+            continue
+        if best <= np.float32(MAX_SECOND) * _least_beside(costs, best_y, best_x):
             t, s = _refine_shift(reference, other, top, left, best_y - reach, best_x - reach)
             found[k, 0], found[k, 1] = t, s
+
+
+@kernel
+def _are_unique(luma, points, reach, unique):
+    """Fill `unique` with whether each point's patch resembles no other place as much as one a pixel beside it.
+
+    Places of a pattern that repeats, and of an edge, along which a patch slides, are not unique.
+    """
+    radius = PATCH_RADIUS_PX
+    costs = np.empty((2 * reach + 1, 2 * reach + 1), np.float32)
+    for k in range(len(points)):
+        top, left = points[k, 0] - radius, points[k, 1] - radius
+        _fill_costs(luma, luma, top, left, reach, np.float32((2 * radius + 1) ** 2), costs)
+        beside = costs[reach - 1, reach] + costs[reach + 1, reach] + costs[reach, reach - 1] + costs[reach, reach + 1]
+        unique[k] = _least_beside(costs, reach, reach) > beside / 4
+
+
+@kernel
+def _fill_costs(reference, other, top, left, reach, worst, costs):
+    """Fill `costs` with the squared difference of a patch and each place around it; sums stop above `worst`."""
+    side, (height, width) = 2 * PATCH_RADIUS_PX + 1, reference.shape
+    costs[:] = np.float32(side**2)
+    for y in range(max(top - reach, 0), min(top + reach, height - side) + 1):
+        for x in range(max(left - reach, 0), min(left + reach, width - side) + 1):
+            cost = np.float32(0)
+            for row in range(side):
+                for column in range(side):
+                    difference = reference[top + row, left + column] - other[y + row, x + column]
+                    cost += difference * difference
+                if cost > worst:
+                    break
+            costs[y - top + reach, x - left + reach] = cost
+
+
+@kernel
+def _least_beside(costs, y, x):
+    """Return the least cost more than a pixel away from a place."""
+    least = np.float32((2 * PATCH_RADIUS_PX + 1) ** 2)
+    for row in range(costs.shape[0]):
+        for column in range(costs.shape[1]):
+            if abs(row - y) > 1 or abs(column - x) > 1:
+                least = min(least, costs[row, column])
+    return least
 
 
 @kernel

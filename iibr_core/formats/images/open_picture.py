@@ -92,6 +92,10 @@ class OpenPicture:
         """Return the size, as stored, of a picture in the file."""
         return READERS[self.kind].header(self.path, number).size if number else self.size
 
+    def orientation_of(self, number: int) -> int:
+        """Return the orientation of a picture in the file."""
+        return READERS[self.kind].header(self.path, number).orientation if number else self.orientation
+
     def decode(self, number: int = 0) -> Picture:
         """Read a picture as its file stores it: without conversion of its colours, and not turned by its orientation.
 

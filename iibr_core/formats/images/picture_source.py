@@ -55,6 +55,13 @@ def source_size(source: PictureSource) -> ImageSize:
     return open_picture(source.path).size_of(source.number) if source.part is None else source.part.size
 
 
+def shown_size(source: PictureSource) -> ImageSize:
+    """Return the size from the file's header, as shown: a whole picture is turned by its orientation."""
+    picture, size = open_picture(source.path), source_size(source)
+    is_turned = source == source.whole and picture.orientation_of(source.number) >= 5
+    return ImageSize(size.width, size.height) if is_turned else size
+
+
 def read_source(source: PictureSource) -> Picture:
     """Decode a picture: a part of it upright, a whole one as stored."""
     picture = open_picture(source.path).decode(source.number)

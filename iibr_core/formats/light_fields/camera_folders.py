@@ -23,6 +23,7 @@ from iibr_core.formats.light_fields.multi_view_scene import (
     pictures_in,
     place_on_grid,
     slope,
+    turned_upright,
 )
 from iibr_core.formats.poses import central_camera, poses_in, read_llff_poses, read_named_poses
 from iibr_core.types import Camera, InputError, ViewOffset
@@ -122,6 +123,9 @@ def _field_of(
     placed = place_on_grid(scene, places)
     if placed.grid is None:
         return None
+    orientations = {open_picture(picture).orientation for picture in pictures}
+    placed = turned_upright(placed, orientations.pop()) if len(orientations) == 1 else placed
+    assert placed.grid is not None
     return replace(placed, layout=f"{kind}, {placed.grid.columns}x{placed.grid.rows}")
 
 

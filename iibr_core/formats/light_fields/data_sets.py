@@ -69,7 +69,8 @@ def read_stanford(folder: Path) -> MultiView | None:
     if are_known or placed.grid is None:
         return placed
     ranks = [np.unique(index[:, axis], return_inverse=True)[1] for axis in (0, 1)]
-    return replace(placed, numbers=tuple((int(row), int(column)) for row, column in zip(*ranks)))
+    numbers = tuple((int(row), int(column)) for row, column in zip(*ranks))
+    return replace(placed, numbers=numbers, is_stated=True)
 
 
 def _viewpoints(index: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, str, bool]:

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from iibr_core.formats.files import entries_of, read_text, reason_of
@@ -43,6 +44,8 @@ MIN_VIEWS_PER_PREVIEW = 9
 """Fewest views for each picture of another name among them."""
 MIN_FILLED = 0.8
 """Smallest share of a grid of rows and columns that pictures with any names fill."""
+MAX_PLACES_PER_VIEW = 9
+"""Largest number of places for each view in a grid of which views are missing; more come from misread names."""
 MIN_SIDE = 9
 """Fewest rows of a square that only the number of its pictures suggests: 25 numbered photos may be of a holiday."""
 GUESSED_VIEWS = 3, 1000
@@ -51,26 +54,56 @@ GUESSED_VIEWS = 3, 1000
 
 def read_grid(folder: Path) -> MultiView | None:
     """Return the views of a grid folder, None if its pictures are not numbered as a grid."""
-    inside = folder / "views" if (folder / "views").is_dir() else folder
+    inside = _inside(folder)
     layout, views, is_guess = _lay_out(sorted(preferred_files(pictures_in(inside), PICTURE_EXTENSIONS).values()))
     parameters = read_parameters(folder)
     stated = _stated_grid(parameters)
     if not views:
         return None
-    if len(next(iter(views))) == 1:
+    is_stated, is_row_by_row = not is_guess or stated is not None, len(next(iter(views))) == 1
+    if is_row_by_row:
         if is_guess and stated is None and not _may_be_a_grid(views):
             return None
         views, grid = _in_order(folder, views, stated)
         side = math.isqrt(len(views))
-        is_guess = is_guess and stated is None and (side < MIN_SIDE or side**2 != len(views))
+        is_guess = not is_stated and (side < MIN_SIDE or side**2 != len(views))
     else:
-        views = _from_least(views) if is_guess else views
+        views = _without_gaps(_from_least(views) if is_guess else views)
         grid, is_guess = GridShape(*(max(axis) + 1 for axis in zip(*views))), False
         _require_fitting(folder, grid, len(views))
-        if missing := [at for at in _places(grid) if at not in views]:
-            raise _missing_view(next(iter(views.values())), missing, f"{grid.rows}x{grid.columns}")
-    scene = _grid_scene(folder, f"{layout}, {grid.columns}x{grid.rows}", grid, sorted(views.items()), parameters)
-    return replace(scene, stated_grid=stated, is_guess=is_guess)
+    missing = [at for at in _places(grid) if at not in views] if len(next(iter(views))) == 2 else []
+    if missing and not _is_star(views, grid):
+        raise _missing_view(next(iter(views.values())), missing, f"{grid.rows}x{grid.columns}")
+    words = f"{layout}, {grid.columns}x{grid.rows}" + (f", {len(views)} views: a star" if missing else "")
+    scene = _grid_scene(folder, words, grid, sorted(views.items()), parameters)
+    return replace(scene, stated_grid=stated, is_guess=is_guess, is_stated=is_stated)
+
+
+def read_in_grid(folder: Path, grid: GridShape | None) -> MultiView | None:
+    """Return the pictures of a folder, by name, on a grid that the user states; None if they do not fill it.
+
+    Without a grid they are a square, else one row.
+    """
+    pictures = sorted(preferred_files(pictures_in(_inside(folder)), PICTURE_EXTENSIONS).values(), key=natural_key)
+    pictures = [path for path in pictures if not MAP_WORDS.search(path.stem)]
+    grid = grid or _square_or_row(len(pictures))
+    if len(pictures) != math.prod(grid) or len(pictures) < 2:
+        return None
+    layout = f"pictures by name, {grid.columns}x{grid.rows}"
+    scene = _grid_scene(
+        folder, layout, grid, [((k,), path) for k, path in enumerate(pictures)], read_parameters(folder)
+    )
+    return replace(scene, stated_grid=grid, is_stated=True)
+
+
+def natural_key(path: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts paths by name, numbers by their value."""
+    parts = re.split(r"(\d+)", path.stem.casefold())
+    return [(int(part), "") if part.isdecimal() else (0, part) for part in parts]
+
+
+def _inside(folder: Path) -> Path:
+    return folder / "views" if (folder / "views").is_dir() else folder
 
 
 Numbered = Mapping[tuple[int, ...], Path]
@@ -126,9 +159,27 @@ def _by_any_numbers(pictures: list[Path]) -> Numbered:
     return views if len(varying) == 1 or math.prod(sides) * MIN_FILLED <= len(views) else {}
 
 
+def _without_gaps(views: Numbered) -> Numbered:
+    """Return the views counted from 0 along each axis whose numbers have a constant step, as every second one."""
+    ranks = []
+    for axis in zip(*views):
+        numbers = sorted(set(axis))
+        is_even = len({b - a for a, b in pairwise(numbers)}) <= 1
+        ranks.append({number: rank if is_even else number for rank, number in enumerate(numbers)})
+    return {tuple(rank[n] for rank, n in zip(ranks, numbers)): path for numbers, path in views.items()}
+
+
+def _is_star(views: Iterable[tuple[int, ...]], grid: GridShape) -> bool:
+    """Return whether the views are the whole middle row and column of a grid, its diagonals, or all of these."""
+    (v0, u0), there = ((length - 1) / 2 for length in grid), set(views)
+    steps = [((v, u), abs(v - v0), abs(u - u0)) for v, u in _places(grid)]
+    cross, diagonals = {at for at, t, s in steps if 0 in (t, s)}, {at for at, t, s in steps if t == s}
+    return there in (cross, diagonals, cross | diagonals) and grid.rows == grid.columns
+
+
 def _may_be_a_grid(views: Numbered) -> bool:
     """Return whether pictures that are numbered as photos may be a light field: none is missing between them."""
-    numbers = [number for (number,) in views]
+    numbers = [number for (number,) in _without_gaps(views)]
     return GUESSED_VIEWS[0] <= len(views) <= GUESSED_VIEWS[1] and max(numbers) - min(numbers) + 1 == len(views)
 
 
@@ -141,27 +192,44 @@ def _stated_grid(parameters: Mapping[str, float]) -> GridShape | None:
 def _in_order(folder: Path, views: Numbered, stated: GridShape | None) -> tuple[Numbered, GridShape]:
     """Return pictures by their place in their order, and their grid: as stated, else a square or a single row.
 
-    Where most numbers are left out, as where every tenth view was kept, no view counts as missing.
+    A part of a stated grid, or of a square that HCI's names fill, comes by row and column: every n-th row and column,
+    or a star. Where most numbers are left out otherwise, no view counts as missing.
     """
-    pictures, count = {number: path for (number,), path in views.items()}, len(views)
+    numbers, pictures = sorted(number for (number,) in views), {n: path for (n,), path in views.items()}
+    evenly, count = {n: path for (n,), path in _without_gaps(views).items()}, len(views)
+    span = range(min(evenly), max(evenly) + 1)
+    whole = stated or (None if len(span) == count else _square_of_hci(pictures))
+    if whole is not None and count < math.prod(whole):
+        first = int(numbers[-1] >= math.prod(whole))  # numbers may be counted from 1
+        placed = _without_gaps({divmod(number - first, whole.columns): pictures[number] for number in numbers})
+        part = GridShape(*(max(axis) + 1 for axis in zip(*placed)))
+        if math.prod(part) == count or _is_star(placed, part):
+            return placed, part
+        _require_fitting(folder, whole, count)
+        missing = [n for n in range(first, first + math.prod(whole)) if n not in pictures]
+        raise _missing_view(pictures[numbers[0]], [(n,) for n in missing], f"{whole.rows}x{whole.columns}")
     if stated is not None:
         _require_fitting(folder, stated, count)
-    numbers = sorted(pictures)
-    span = range(numbers[0], numbers[-1] + 1)
-    missing = sorted(set(span) - set(numbers)) if len(span) < 2 * count else []
-    if stated is not None and (missing or count < math.prod(stated)):
-        missing = sorted(set(range(math.prod(stated))) - set(numbers))
-    if missing:
-        total = f"{stated.rows}x{stated.columns}" if stated else f"{count + len(missing)}"
-        raise _missing_view(pictures[numbers[0]], [(number,) for number in missing], total)
+    elif len(span) < 2 * count and (missing := [n for n in span if n not in evenly]):
+        raise _missing_view(pictures[numbers[0]], [(n,) for n in missing], str(len(span)))
+    return {(k,): pictures[number] for k, number in enumerate(numbers)}, stated or _square_or_row(count)
+
+
+def _square_or_row(count: int) -> GridShape:
     side = math.isqrt(count)
-    square = GridShape(side, side) if side**2 == count else GridShape(1, count)
-    return {(k,): pictures[number] for k, number in enumerate(numbers)}, stated or square
+    return GridShape(side, side) if side**2 == count else GridShape(1, count)
+
+
+def _square_of_hci(pictures: Mapping[int, Path]) -> GridShape | None:
+    """Return the square whose last view is there under HCI's name, which counts row by row from 0."""
+    last = max(pictures)
+    side = math.isqrt(last + 1)
+    return GridShape(side, side) if side**2 == last + 1 and HCI_NAME.match(pictures[last].stem) else None
 
 
 def _require_fitting(folder: Path, grid: GridShape, count: int) -> None:
-    """Raise InputError if the grid has too few places, or more than half of them are empty."""
-    if min(grid) < 1 or not count <= grid.rows * grid.columns <= 2 * count:
+    """Raise InputError if the grid has too few places, or most of them are empty."""
+    if min(grid) < 1 or not count <= grid.rows * grid.columns <= MAX_PLACES_PER_VIEW * count:
         raise InputError(
             f"{folder}: {count} views do not fit a grid of {grid.rows}x{grid.columns}; correct names or parameters.cfg"
         )

@@ -7,11 +7,13 @@ reader returns None for other layouts, and raises InputError with the file's nam
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from iibr_core.formats.files import require_file
+from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
 from iibr_core.formats.light_fields.write import LENSLET_TAG
 from iibr_core.formats.quilts import TAG as QUILT_TAG
 from iibr_core.types import InputError
@@ -48,11 +50,21 @@ def find_light_field(path: Path) -> MultiView | None:
     return None if scene is None or scene.is_guess else scene
 
 
-def open_light_field(path: Path) -> MultiView:
-    """Return the scene of a folder or file; numbered pictures that may be views count, too (`is_guess`)."""
+def open_light_field(path: Path, given: Arrangement = UNKNOWN) -> MultiView:
+    """Return the scene of a folder or file; numbered pictures that may be views count, too (`is_guess`).
+
+    given: what the user states of their order; by a grid or an order, all pictures of a folder are views.
+    """
     if not path.is_dir():
         require_file(path)
-    scene = _read(path)
+    is_stated = path.is_dir() and (given.grid or given.order) is not None
+    scene = None
+    with suppress(*((InputError,) if is_stated else ())):
+        scene = _read(path)
+    if scene is None and is_stated:
+        from iibr_core.formats.light_fields.grids import read_in_grid
+
+        scene = read_in_grid(path, given.grid) or _read(path)
     if scene is None:
         if path.is_dir() and not any(path.iterdir()):
             raise InputError(f"{path}: no photos in it")

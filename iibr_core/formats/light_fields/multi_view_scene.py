@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import entries_of
-from iibr_core.formats.images.picture_source import PictureSource, source_size
+from iibr_core.formats.images.picture_source import PictureSource, shown_size
 from iibr_core.types import Camera, GridShape, ImageSize, InputError, ViewOffset
 
 PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", ".bmp", ".webp")
@@ -21,6 +21,12 @@ PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", 
 MAP_EXTENSIONS = (".pfm", ".npy", ".exr", ".png", ".pgm")
 """Endings of disparity maps; the first one counts where a map exists in several kinds."""
 MAX_VIEWS = 10_000
+
+UPRIGHT_AXES = {
+    1: ((1, 0), (0, 1)), 2: ((1, 0), (0, -1)), 3: ((-1, 0), (0, -1)), 4: ((-1, 0), (0, 1)),
+    5: ((0, 1), (1, 0)), 6: ((0, 1), (-1, 0)), 7: ((0, -1), (-1, 0)), 8: ((0, -1), (1, 0)),
+}  # fmt: skip
+"""Steps down and to the right, as shown, of one step down and one to the right as stored, by Exif's orientation."""
 
 GridIndex = tuple[int, int]
 """Row and column of a view on a grid, (v, u): rows downwards, columns to the right, both from 0."""
@@ -66,7 +72,8 @@ class MultiView:
     None where they fill none. focal_px: focal length in pixels of a view; infinity_px: disparity of infinitely far
     points, px per view step; both where the data set states them. numbers: row and column in the name of each view, or
     its number in one order, counted from 0; none where the layout is sure of the places. stated_grid: grid of numbered
-    views that a file states. is_guess: whether they are numbered as photos of a holiday may be.
+    views that a file states. is_guess: whether they are numbered as photos of a holiday may be. is_stated: whether the
+    layout states the order of its numbers, so that it holds unless parallax clearly shows another.
     """
 
     name: str
@@ -82,6 +89,7 @@ class MultiView:
     numbers: tuple[tuple[int, ...], ...] = ()
     stated_grid: GridShape | None = None
     is_guess: bool = False
+    is_stated: bool = False
 
     @property
     def centre(self) -> int:
@@ -119,8 +127,8 @@ def nearest_view(views: Sequence[KnownView], to: ViewOffset) -> int:
 
 
 def common_size(views: Sequence[KnownView]) -> ImageSize:
-    """Return the size of all views, read from their headers."""
-    sizes = {view.picture: source_size(view.picture) for view in views}
+    """Return the size of all views, upright, read from their headers."""
+    sizes = {view.picture: shown_size(view.picture) for view in views}
     first = views[0].picture
     for picture, size in sizes.items():
         if size != sizes[first]:
@@ -142,6 +150,27 @@ def place_on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:
     places = [(rows.index(row), columns.index(column)) for row, column in numbers]
     views = tuple(replace(view, place=place) for view, place in zip(scene.views, places))
     return replace(scene, views=views, grid=GridShape(len(rows), len(columns)))
+
+
+def turned_upright(scene: MultiView, orientation: int) -> MultiView:
+    """Return a scene whose viewpoints lie along the axes of the pictures as stored, along those as shown.
+
+    orientation: Exif's, of all its pictures.
+    """
+    down, right = UPRIGHT_AXES[orientation]
+
+    def turn(at: tuple[float, float]) -> tuple[float, float]:
+        return down[0] * at[0] + down[1] * at[1], right[0] * at[0] + right[1] * at[1]
+
+    if scene.grid is None or orientation == 1:
+        return scene
+    places = [turn(view.place) for view in scene.views if view.place is not None]
+    least, rows_columns = [min(axis) for axis in zip(*places)], [abs(n) for n in turn(scene.grid)]
+    views = tuple(
+        replace(view, offset=ViewOffset(*turn(view.offset)), place=(int(v - least[0]), int(u - least[1])))
+        for view, (v, u) in zip(scene.views, places)
+    )
+    return replace(scene, views=views, grid=GridShape(*map(int, rows_columns)))
 
 
 def line_numbers(values: NDArray[np.float64], min_gap: float) -> NDArray[np.int64]:

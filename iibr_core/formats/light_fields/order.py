@@ -48,17 +48,20 @@ def numbers_of(scene: MultiView) -> Sequence[tuple[int, ...]]:
 
 
 def possible_arrangements(scene: MultiView, given: Arrangement = UNKNOWN) -> list[Arrangement]:
-    """Return the orders and grids that the names admit, the likeliest first, without flips.
+    """Return the orders and grids that the names admit, the likeliest first.
 
+    A flip is that given, or one of the two ways to count the tiles of a quilt: from the bottom left or the top left.
     Raises InputError if a grid or an order is given that the views do not fill.
     """
     numbers = numbers_of(scene)
     if not numbers:
         return []
     if len(numbers[0]) == 2:
-        rows, columns = (len(set(axis)) for axis in zip(*numbers))
+        rows, columns = _lattice(numbers)
         shapes = [GridShape(rows, columns), GridShape(columns, rows)]
         pairs = [(order, shapes["columns" in order]) for order in ORDERS[: 4 if min(rows, columns) > 1 else 2]]
+        if is_quilt(scene):
+            pairs = [("rows", GridShape(1, rows * columns)), *pairs[:1]]
     else:
         shapes = [scene.stated_grid] if scene.stated_grid is not None else _shapes(len(numbers))
         pairs = [(order, shape) for shape in shapes for order in ORDERS[: 4 if min(shape) > 1 else 1]]
@@ -69,11 +72,31 @@ def possible_arrangements(scene: MultiView, given: Arrangement = UNKNOWN) -> lis
             f" give {grids}"
         )
     ordered = [(order, shape) for order, shape in pairs if given.order in (None, order)]
-    possible = [Arrangement(order, shape) for order, shape in ordered if given.grid in (None, shape)]
+    possible = [
+        Arrangement(order, shape, flip)
+        for order, shape in ordered
+        if given.grid in (None, shape)
+        for flip in ((given.flip,) if given.flip or not _is_line_of(numbers, shape) else ("none", "y"))
+    ]
     if not possible:
         ways = ", ".join(f"{order} {shape.rows}x{shape.columns}" for order, shape in pairs)
         raise InputError(f"{scene.place}: its views are not counted by {given.order} of this grid; give {ways}")
     return possible
+
+
+def is_quilt(scene: MultiView) -> bool:
+    """Return whether the views are one line, counted along the rows of the tiles of a picture, the lowest first."""
+    return scene.grid is not None and bool(scene.numbers) and _is_line_of(scene.numbers, scene.grid)
+
+
+def _is_line_of(numbers: Sequence[tuple[int, ...]], grid: GridShape) -> bool:
+    """Return whether a grid is one line of views whose names have a row and a column."""
+    return len(numbers[0]) == 2 and min(grid) == 1 < min(_lattice(numbers))
+
+
+def _lattice(numbers: Sequence[tuple[int, ...]]) -> GridShape:
+    """Return the rows and columns in names of two numbers."""
+    return GridShape(*(len(set(axis)) for axis in zip(*numbers)))
 
 
 def _shapes(count: int) -> list[GridShape]:
@@ -86,6 +109,9 @@ def _shapes(count: int) -> list[GridShape]:
 def places_in(numbers: Sequence[tuple[int, ...]], arrangement: Arrangement) -> list[GridIndex]:
     """Return the row and column of each view. numbers: counted from 0 without gaps."""
     assert arrangement.grid is not None
+    if _is_line_of(numbers, arrangement.grid):
+        tiles = _lattice(numbers)
+        return [(0, v * tiles.columns + u) for v, u in places_in(numbers, replace(arrangement, grid=tiles))]
     grid, order, flip = arrangement.grid, arrangement.order or "rows", arrangement.flip or "none"
     lines, places = grid.columns if "columns" not in order else grid.rows, []
     for number in numbers:
@@ -113,4 +139,8 @@ def arranged(scene: MultiView, arrangement: Arrangement) -> MultiView:
         replace(view, place=place, offset=ViewOffset(place[0] * step, float(place[1])))
         for view, place in zip(scene.views, places_in(numbers_of(scene), arrangement))
     )
-    return replace(scene, views=views, grid=arrangement.grid, numbers=(), is_guess=False)
+    layout = scene.layout
+    if scene.grid is not None:
+        named, found = (f"{grid.columns}x{grid.rows}" for grid in (scene.grid, arrangement.grid))
+        layout = layout.replace(named, found)
+    return replace(scene, layout=layout, views=views, grid=arrangement.grid, numbers=(), is_guess=False)

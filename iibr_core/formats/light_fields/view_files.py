@@ -35,8 +35,9 @@ def read_quilt(path: Path) -> MultiView | None:
         sources.append(PictureSource(path, 0, PicturePart((rows.start, columns.start), quilt.tile), shown_size))
     views = tuple(_view(f"view {k}", (0, k), source) for k, source in enumerate(sources))
     layout = f"quilt, {quilt.columns}x{quilt.rows} views"
-    numbers = tuple((0, number) for number in range(quilt.views))
-    return MultiView(TAG.sub("", path.stem), layout, views, grid=GridShape(1, quilt.views), numbers=numbers)
+    across = quilt.columns if quilt.columns > 1 else quilt.views
+    grid, numbers = GridShape(1, quilt.views), tuple(divmod(k, across) for k in range(quilt.views))
+    return MultiView(TAG.sub("", path.stem) or path.stem, layout, views, grid=grid, numbers=numbers, is_stated=True)
 
 
 def _shown_size(quilt: Quilt) -> ImageSize | None:

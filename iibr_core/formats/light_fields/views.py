@@ -44,7 +44,7 @@ def read_views(scene: MultiView) -> tuple[ImageSize, Iterator[ViewUpdate]]:
 def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
     """Return the colours (H, W, 3) of one view."""
     grid = grid_of(scene)
-    if not (0 <= row < grid.rows and 0 <= column < grid.columns):
+    if (row, column) not in _indices(scene):
         raise InputError(f"{scene.place}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
     return next(_read_colors(scene, [_indices(scene)[row, column]]))
 
@@ -57,7 +57,7 @@ def disparity_range(scene: MultiView) -> tuple[float, float] | None:
     if scene.range_px is not None:
         low, high = scene.range_px
         return low * step_length(scene), high * step_length(scene)
-    known = next((indices[at] for at in _nearest_to_centre(grid) if indices[at] in scene.disparity), None)
+    known = next((indices[at] for at in _nearest_to_centre(grid) if indices.get(at) in scene.disparity), None)
     if known is None:
         return None
     values = _read_map(scene, known, common_size(scene.views[:1]))
@@ -69,12 +69,13 @@ def step_length(scene: MultiView) -> float:
 
     It exceeds 1 where views were left out, as every second column.
     """
-    grid = grid_of(scene)
-    last = (0, grid.columns - 1) if grid.columns > 1 else (grid.rows - 1, 0)
-    if last == (0, 0):
+    grid, indices = grid_of(scene), _indices(scene)
+    if len(indices) == 1:
         return 1.0
-    start, end = (scene.views[_indices(scene)[at]].offset for at in ((0, 0), last))
-    return math.hypot(end.t - start.t, end.s - start.s) / max(last)
+    first = (0, 0) if (0, 0) in indices else (grid.rows // 2, 0)  # a star may have no corners
+    last = (first[0], grid.columns - 1) if grid.columns > 1 else (grid.rows - 1, 0)
+    start, end = (scene.views[indices[at]].offset for at in (first, last))
+    return math.hypot(end.t - start.t, end.s - start.s) / max(last[0] - first[0], last[1])
 
 
 def view_offsets(scene: MultiView) -> list[ViewOffset]:
@@ -100,8 +101,8 @@ def row_step_of(scene: MultiView) -> float:
     if min(grid) == 1:
         return 1.0
     below, right = grid.rows - 1, grid.columns - 1
-    down = fmean(offsets[below, u].t - offsets[0, u].t for u in range(grid.columns)) / below
-    across = fmean(offsets[v, right].s - offsets[v, 0].s for v in range(grid.rows)) / right
+    down = fmean(offsets[below, u].t - offsets[0, u].t for u in range(grid.columns) if (0, u) in offsets) / below
+    across = fmean(offsets[v, right].s - offsets[v, 0].s for v in range(grid.rows) if (v, 0) in offsets) / right
     is_equal = min(down, across) <= 0 or abs(down / across - 1) < EQUAL_STEPS
     return 1.0 if is_equal else down / across
 
@@ -116,12 +117,13 @@ def _indices(scene: MultiView) -> dict[GridIndex, int]:
 
 
 def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterator[ViewUpdate]:
-    indices, order = _indices(scene), _nearest_to_centre(grid)
+    indices = _indices(scene)
+    order = [at for at in _nearest_to_centre(grid) if at in indices]
     for at, colors in zip(order, _read_colors(scene, [indices[at] for at in order])):
         index = indices[at]
         if image_size(colors) != size:
             path = scene.views[index].path
-            raise InputError(f"{path}: is rotated by its Exif orientation; views must be stored upright")
+            raise InputError(f"{path}: is {image_size(colors)}, but the other views are {size}")
         disparity = _read_map(scene, index, size) if index in scene.disparity else None
         yield ViewUpdate(*at, colors, disparity)
 

@@ -7,6 +7,7 @@ from PIL import Image
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.formats.light_fields.order import Arrangement
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
@@ -98,9 +99,51 @@ def test_a_few_numbered_photos_are_no_light_field(tmp_path, count) -> None:
     assert open_light_field(tmp_path).grid == (1, count)
 
 
-def test_views_of_which_every_third_was_kept_stand_on_a_square(tmp_path) -> None:
-    write_flat(tmp_path, [f"input_Cam{3 * k:03d}.png" for k in range(9)])
-    assert open_light_field(tmp_path).grid == (3, 3)
+@pytest.mark.parametrize(
+    ("names", "grid"),
+    [
+        ([f"input_Cam{3 * k:03d}.png" for k in range(9)], (3, 3)),
+        ([f"input_Cam{9 * v + u:03d}.png" for v in range(0, 9, 2) for u in range(0, 9, 4)], (5, 3)),
+        ([f"v{v:02d}_u{u:02d}.png" for v in range(1, 9, 3) for u in range(0, 9, 2)], (3, 5)),
+        ([f"shot {2 * k + 1}.png" for k in range(25)], (5, 5)),
+    ],
+)
+def test_views_at_regular_gaps_are_a_smaller_grid(tmp_path, names, grid) -> None:
+    assert open_light_field(write_flat(tmp_path, names)).grid == grid
+
+
+@pytest.mark.parametrize("name", ["input_Cam{k:03d}.png", "v{v:02d}_u{u:02d}.png"])
+@pytest.mark.parametrize("count", [17, 33])
+def test_a_star_is_opened_without_the_views_between(tmp_path, name, count) -> None:
+    places = [(v, u) for v, u in np.ndindex(9, 9) if 4 in (v, u) or (count == 33 and v in (u, 8 - u))]
+    star = write_flat(tmp_path, [name.format(v=v, u=u, k=9 * v + u) for v, u in places])
+    (star / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 9\nnum_cams_y = 9\n")
+    scene = open_light_field(star)
+    assert (scene.grid, len(scene.views), scene.layout.split(", ")[1:]) == (
+        (9, 9),
+        count,
+        ["9x9", f"{count} views: a star"],
+    )
+    assert {(view.row, view.column) for view in read_views(scene)[1]} == set(places)
+    (star / name.format(v=4, u=1, k=37)).unlink()
+    with pytest.raises(InputError, match=rf"\({82 - count} of 9x9 views are\)"):
+        open_light_field(star)
+
+
+def test_hidden_files_are_no_views(tmp_path) -> None:
+    write_flat(tmp_path, [f"img_{k:03d}.png" for k in range(81)])
+    for k in range(81):
+        (tmp_path / f"._img_{k:03d}.png").write_bytes(b"\0\5\x16\7")
+    assert open_light_field(tmp_path).grid == (9, 9)
+
+
+def test_a_given_grid_opens_pictures_under_any_names(tmp_path) -> None:
+    write_flat(tmp_path, [f"shot {n} of {n % 5}{n}.png" for n in (1, 2, 5, 9, 10, 17)])
+    with pytest.raises(InputError, match="holds no light field"):
+        open_light_field(tmp_path)
+    scene = open_light_field(tmp_path, Arrangement(grid=GridShape(2, 3)))
+    assert [view.path.stem.split()[1] for view in scene.views] == ["1", "2", "5", "9", "10", "17"]
+    assert scene.views[3].place == (1, 0)
 
 
 @pytest.mark.parametrize(

@@ -147,13 +147,92 @@ def test_an_order_that_contradicts_its_grid_and_a_single_view_are_named(tmp_path
         find_disparity(Source(str(alone)))
 
 
-def test_views_in_no_order_are_refused(tmp_path: Path) -> None:
+def test_views_in_no_order_are_refused_unless_the_layout_or_the_user_states_one(tmp_path: Path) -> None:
     places = np.random.default_rng(4).permutation(grid(5, 5))
-    folder = write_views(tmp_path / "field", {f"v{k // 5}_u{k % 5}": centred(*at) for k, at in enumerate(places)})
+    folder = write_views(tmp_path / "field", {f"lf_{k // 5}_{k % 5}": centred(*at) for k, at in enumerate(places)})
     with pytest.raises(InputError, match="fits no order that their names suggest"):
         find_disparity(Source(str(folder)))
-    field = open_settled(Source(str(folder), arrangement=Arrangement("columns")))[0]
+    field, (note,) = open_settled(Source(str(folder), arrangement=Arrangement("columns")))
     assert [view.place for view in field.views] == [(k % 5, k // 5) for k in range(25)]
+    assert "in the given order, though their parallax fits none" in note
+    stated = write_views(tmp_path / "stated", {f"v{k // 5}_u{k % 5}": centred(*at) for k, at in enumerate(places)})
+    field, (note,) = open_settled(Source(str(stated)))
+    assert [view.place for view in field.views] == grid(5, 5)
+    assert "in the order of their names, though their parallax fits none" in note
+
+
+def write_drawn(folder: Path, drawing: str, disparity: float) -> Path:
+    """Write 7x7 views of a pattern that repeats or is thin, under names that state their order."""
+    folder.mkdir()
+    rng = np.random.default_rng(7)
+    noise = gaussian_filter(rng.normal(size=(HEIGHT + 40, WIDTH + 40)), 0.8)
+    for row, column in grid(7, 7):
+        y, x = np.mgrid[: 4 * HEIGHT, : 4 * WIDTH] / 4.0
+        y, x = y + disparity * (row - 3) + 20, x + disparity * (column - 3) + 20
+        if drawing == "wedges":  # before noise that moves the other way
+            edge = WIDTH * (0.1 + 0.8 * np.abs(2 * (y / 6 % 1) - 1)) + 20
+            behind = map_coordinates(noise, [y - 2 * disparity * (row - 3), x - 2 * disparity * (column - 3)], order=1)
+            luma = np.where(x < edge, 170, 90 + 25 * behind)
+        else:
+            luma = {"squares": (x // 9 + y // 9) % 2 * 120, "stripes": x // 5 % 2 * 120}[drawing] + 60
+        pixels = luma.reshape(HEIGHT, 4, WIDTH, 4).mean((1, 3)) + rng.normal(0, 1.5, (HEIGHT, WIDTH))
+        Image.fromarray(pixels.clip(0, 255).astype(np.uint8)).convert("RGB").save(
+            folder / f"v{row:02d}_u{column:02d}.png"
+        )
+    return folder
+
+
+@pytest.mark.parametrize("drawing", ["wedges", "squares", "stripes"])
+@pytest.mark.parametrize("disparity", [0.35, -0.8])
+def test_repeating_and_thin_patterns_do_not_change_a_stated_order(
+    tmp_path: Path, drawing: str, disparity: float
+) -> None:
+    field, _ = open_settled(Source(str(write_drawn(tmp_path / "field", drawing, disparity))))
+    assert [view.place for view in field.views] == grid(7, 7)
+    assert {view.offset for view in field.views} == {ViewOffset(float(r), float(c)) for r, c in grid(7, 7)}
+
+
+@pytest.mark.parametrize(
+    ("is_from_top", "is_leftwards", "words"),
+    [(False, False, ""), (True, False, "top left"), (False, True, "bottom right"), (True, True, "top right")],
+)
+def test_quilts_may_begin_in_any_corner(tmp_path: Path, is_from_top: bool, is_leftwards: bool, words: str) -> None:
+    quilt = np.zeros((3 * HEIGHT, 4 * WIDTH), np.uint8)
+    for view, (row, column) in enumerate(grid(3, 4)):
+        row, column = row if is_from_top else 2 - row, 3 - column if is_leftwards else column
+        quilt[row * HEIGHT :, column * WIDTH :][:HEIGHT, :WIDTH] = view_at(0.0, (view - 6) / 4)
+    Image.fromarray(quilt).convert("RGB").save(tmp_path / "a_qs4x3.png")
+    _, values, notes = find_disparity(Source(str(tmp_path / "a_qs4x3.png")))
+    assert np.median(values[28:44, 40:56]) == pytest.approx(SQUARE_PX / 4, abs=0.1)
+    assert all(words in note for note in notes)
+    assert bool(notes) == bool(words)
+
+
+def test_a_quilt_may_be_a_mosaic_of_a_grid_of_views(tmp_path: Path) -> None:
+    mosaic = np.vstack([np.hstack([view_at(*centred(r, c, 3, 4)) for c in range(4)]) for r in range(3)])
+    Image.fromarray(mosaic).convert("RGB").save(tmp_path / "lightfield_4x3.png")
+    field, (note,) = open_settled(Source(str(tmp_path / "lightfield_4x3.png")))
+    assert field.grid == (3, 4)
+    assert "3 rows of 4" in note
+
+
+@pytest.mark.parametrize("orientation", [3, 6, 8])
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_views_are_turned_by_their_exif_and_counted_along_either_axis(
+    tmp_path: Path, orientation: int, is_turned: bool
+) -> None:
+    """The names count rows and columns of the pictures as shown, or (is_turned) as stored."""
+    turns = {3: 2, 6: 1, 8: 3}[orientation]
+    exif = Image.Exif()
+    exif[0x112] = orientation
+    places = np.arange(9).reshape(3, 3)
+    for row, column in grid(3, 3):
+        v, u = divmod(int(np.rot90(places, turns)[row, column]), 3) if is_turned else (row, column)
+        stored = Image.fromarray(np.rot90(view_at(*centred(v, u, 3, 3)), turns)).convert("RGB")
+        stored.save(tmp_path / f"v{row:02d}_u{column:02d}.png", exif=exif)
+    _, values, _ = find_disparity(Source(str(tmp_path)))
+    assert np.median(values[28:44, 40:56]) == pytest.approx(SQUARE_PX, abs=0.1)
+    assert np.median(values[:, :20]) == pytest.approx(WALL_PX, abs=0.1)
 
 
 def test_photos_that_are_no_views_are_no_light_field(tmp_path: Path) -> None:

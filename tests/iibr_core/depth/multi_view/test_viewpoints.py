@@ -55,7 +55,7 @@ def test_the_order_of_views_is_found_where_neighbours_differ_by_a_seventh_of_the
         view = wall[14 * row :, 14 * column :][:80, :100].astype(np.uint8)
         Image.fromarray(view).save(tmp_path / f"lf_{column}_{row}.png")
         colors.append(np.float32(view / 255))
-    fit = find_order(open_light_field(tmp_path), colors)
+    fit, _ = find_order(open_light_field(tmp_path), colors)
     assert fit is not None
     assert (fit.arrangement.order, fit.arrangement.flip, fit.arrangement.row_step) == ("columns", "none", 1.0)
 
