@@ -23,6 +23,10 @@ class Remedy(Enum):
     """Download again, from the same place or another, or give a model file."""
     STRETCH = auto()
     """Stretch a depth map to the shape of the photo."""
+    INVERT = auto()
+    """Invert the depth."""
+    INVERT_OR_METRIC = auto()
+    """Invert the depth, or read a map as distances."""
     VIEW_ORDER = auto()
     """State the order of the views of a light field."""
 
@@ -35,12 +39,28 @@ class FixableError(InputError):
         self.remedy = remedy
 
 
-def remedy_of(error: Exception) -> Remedy | None:
-    """Return the remedy of an error, None if none is known."""
-    return error.remedy if isinstance(error, FixableError) else None
+class FixableNote(str):
+    """A note with a known remedy: a sentence, to which each interface may add its words."""
+
+    remedy: Remedy
+
+    def __new__(cls, note: str, remedy: Remedy) -> FixableNote:
+        """Return a note with this remedy."""
+        self = super().__new__(cls, note)
+        self.remedy = remedy
+        return self
+
+    def __getnewargs__(self) -> tuple[str, Remedy]:  # type: ignore[override]
+        """Return the arguments from which pickle makes the note again."""
+        return str(self), self.remedy
 
 
-def with_remedy(error: Exception, words: Mapping[Remedy, str]) -> str:
-    """Return the message of an error, followed by the words of an interface for its remedy."""
-    remedy = remedy_of(error)
-    return str(error) if remedy is None else f"{error}; {words[remedy]}"
+def remedy_of(message: Exception | str) -> Remedy | None:
+    """Return the remedy of an error or a note, None if none is known."""
+    return message.remedy if isinstance(message, FixableError | FixableNote) else None
+
+
+def with_remedy(message: Exception | str, words: Mapping[Remedy, str]) -> str:
+    """Return an error or a note, followed by the words of an interface for its remedy."""
+    remedy, end = remedy_of(message), "." if isinstance(message, str) else ""
+    return str(message) if remedy is None else f"{str(message).removesuffix('.')}; {words[remedy]}{end}"

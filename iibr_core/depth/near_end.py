@@ -1,4 +1,4 @@
-"""Evidence from the photo on its map: which end is near, which way up the map lies, and whether zeros are depth.
+"""Evidence from the photo on its map: which end is near, and which way up the map lies.
 
 Photo and map are compared at a small size. The picture's cues (`guess`) order pixels by depth.
 """
@@ -20,8 +20,6 @@ SURE_CORRELATION = 0.25
 """Rank correlation of map and guess from which the photo decides: 0.44 was the least of 20 scenes with known depth."""
 TURNED_MARGIN = 0.1
 """Gain in the correlation of edges from which a map counts as turned."""
-SMALL_SHARE = 0.03
-"""Share of the width, of the picture, or of the range of values below which a hole, an area or a gap is small."""
 
 
 def near_evidence(photo: FloatImage, values: FloatImage) -> float:
@@ -38,25 +36,6 @@ def near_evidence(photo: FloatImage, values: FloatImage) -> float:
 def is_better_turned(photo: FloatImage, values: FloatImage, turned: FloatImage) -> bool:
     """Return whether the edges of a map fit those of the photo (H, W, 3) clearly better once the map is turned."""
     return _edge_correlation(photo, turned) > _edge_correlation(photo, values) + TURNED_MARGIN
-
-
-def zeros_are_depth(values: FloatImage, is_zero: NDArray[np.bool_]) -> bool:
-    """Return whether the zeros of a map of integers (h, w) are its farthest or nearest depth, not unknown values.
-
-    They are depth if the other values reach down to nearly 0, and if most of them form large areas, such as sky:
-    sensors and matching leave out scattered pixels and lines along edges. values: as stored.
-    """
-    others = values[~is_zero & np.isfinite(values)]
-    if not others.size:
-        return False
-    low, high = np.percentile(others, (0.5, 99.5))
-    if low <= SMALL_SHARE * high:
-        return True
-    # Opening: only areas that hold a whole square survive.
-    radius = max(1, round(SMALL_SHARE * is_zero.shape[1] / 2))
-    inner = box_filter(is_zero.astype(np.float32), radius) > 1 - 1e-4
-    areas = is_zero & (box_filter(inner.astype(np.float32), radius) > 1e-6)
-    return bool(areas.mean() >= SMALL_SHARE and 2 * areas.sum() >= is_zero.sum())
 
 
 def _at_compared_size(photo: FloatImage, values: FloatImage) -> tuple[FloatImage, FloatImage]:

@@ -21,6 +21,7 @@ from iibr_core.depth.embedded.embedded import photo_in_focus, read_embedded, rot
 from iibr_core.depth.estimate import DepthEstimate, disparity_from
 from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map
+from iibr_core.depth.map_numbers import numbers_of
 from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.sidecar import find_sidecars, unused_map_notes
 from iibr_core.depth.stereo_pair import estimate_from_pair
@@ -32,7 +33,7 @@ from iibr_core.formats.maps.reader import MapFile, read_depth_channel, read_map_
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.registry import EstimateDepth
-from iibr_core.remedies import Remedy, remedy_of
+from iibr_core.remedies import FixableNote, remedy_of
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
@@ -46,7 +47,6 @@ SUBJECTS: dict[DepthKind, str] = {
 }
 """Subjects of the sentence about a source that fails."""
 
-STRETCH = "; if it shows the whole photo, open it as the depth map and stretch it"
 SlowSource = Literal["pair", "model"]
 """Sources that take long: matching two views, and a model."""
 Source = tuple[DepthKind, Callable[[], "PhotoWithDepth | None"]]
@@ -101,7 +101,8 @@ def find_depth(
         except InputError as error:
             if kind == "model" and choice.asks_for_model:
                 raise
-            failure = f"{SUBJECTS[kind]} was not used: {error}{STRETCH if remedy_of(error) is Remedy.STRETCH else ''}"
+            failure, remedy = f"{SUBJECTS[kind]} was not used: {error}", remedy_of(error)
+            failure = failure if remedy is None else FixableNote(failure, remedy)
             failures += () if failure in failures else (failure,)
             continue
         if found is not None:
@@ -125,7 +126,9 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         depth = model.estimate(replace(found.photo, pixels=colors))
         if found.origin.near:
             is_large_near = (found.origin.near == "the high end") != choice.inverts
-            depth = as_estimate(MapFile(depth.values, "floats"), is_large_near, choice.is_metric or depth.is_metric)
+            depth = as_estimate(
+                numbers_of(MapFile(depth.values, "floats")), is_large_near, choice.is_metric or depth.is_metric
+            )
         values, _ = disparity_from(depth.inverted if choice.inverts else depth, USUAL_GRID)
         return _at_size(without_repeats(values), values.shape[1], found.photo)
 
@@ -184,7 +187,7 @@ class _Search:
 
     def map_inside(self, name: str, found: MapFile, is_distance: bool = False) -> PhotoWithDepth:
         """Return the depth of a map in the photo's file, after its near end was found."""
-        depth = orient_map(self.path.name, found, self.photo, self.choice, is_distance)
+        depth = orient_map(self.path.name, numbers_of(found), self.photo, self.choice, is_distance)
         origin = DepthOrigin("embedded", f"the photo itself ({name})", near=depth.near)
         return self.finish(origin, depth.estimate, found.notes + depth.notes)
 
@@ -204,7 +207,7 @@ class _Search:
         estimate, origin = model.estimate(self.photo), DepthOrigin("model", words, model=model.name)
         if estimate.meaning == "disparity" or model.is_meaning_known:
             return self.finish(origin, estimate)
-        values = MapFile(estimate.values, "floats")
+        values = numbers_of(MapFile(estimate.values, "floats"))
         depth = orient_map(
             model.title, values, self.photo, self.choice, estimate.is_metric, is_stated=estimate.is_metric
         )

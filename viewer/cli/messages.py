@@ -25,13 +25,15 @@ REMEDIES = {
     Remedy.VIEW_ORDER: (
         "give --order, --grid and --flip, correct the names, or rectify views of cameras that were turned"
     ),
+    Remedy.INVERT: "--invert-depth does so",
+    Remedy.INVERT_OR_METRIC: "--invert-depth or --metric does so",
     Remedy.STRETCH: "or add --stretch if it shows the whole photo",
 }
 
 
-def words_of(error: Exception) -> str:
-    """Return the message of an error, with its remedy."""
-    return with_remedy(error, REMEDIES)
+def words_of(message: Exception | str) -> str:
+    """Return an error or a note, with its remedy."""
+    return with_remedy(message, REMEDIES)
 
 
 def print_notes(*notes: str | None, origin: DepthOrigin | None = None) -> None:
@@ -39,7 +41,7 @@ def print_notes(*notes: str | None, origin: DepthOrigin | None = None) -> None:
     better = BETTER_DEPTH if origin is not None and origin.is_poor else None
     sys.stdout.flush()
     for note in filter(None, notes):
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {words_of(note)}", file=sys.stderr)
     if origin is not None:
         print(*filter(None, ("note:", origin.line, better)), file=sys.stderr)
 

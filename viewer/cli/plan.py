@@ -10,6 +10,7 @@ import typer
 
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.scenes.scene import Source
+from viewer.cli.messages import words_of
 from viewer.cli.option_records import with_option_records
 from viewer.cli.options import FocusDisparity, Grid, SceneOptions, require_heeded
 
@@ -31,7 +32,7 @@ def plan(
     first, *reasons = _lines_of_views(source) if is_light_field(path) else _lines_of_photo(source, scene.depth_strength)
     print(first)
     for line in reasons:
-        print(f"- {line}")
+        print(f"- {words_of(line)}")
 
 
 def _lines_of_photo(source: Source, depth_strength: float) -> list[str]:

@@ -14,10 +14,11 @@ WORDS = {
     Remedy.DEPTH: "get it, or open a depth map",
     Remedy.DOWNLOAD: "try again later, or choose a model file",
     Remedy.VIEW_ORDER: "name them by row and column, and rectify views of cameras that were turned",
+    **dict.fromkeys((Remedy.INVERT, Remedy.INVERT_OR_METRIC), "Invert in the panel turns it"),
     Remedy.STRETCH: "or open it as a depth map if it shows the whole photo",
 }
 
 
-def words_of(error: Exception) -> str:
-    """Return the message of an error, with its remedy."""
-    return with_remedy(error, WORDS)
+def words_of(message: Exception | str) -> str:
+    """Return an error or a note, with its remedy."""
+    return with_remedy(message, WORDS)

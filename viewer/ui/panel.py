@@ -14,6 +14,7 @@ from viewer.model import messages, opening, preferences
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
+from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState, DrawReport
 from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Section, is_seen_open
 from viewer.ui.sections import (
@@ -238,7 +239,7 @@ def _scene(state: AppState, scene: Scene) -> list[Action]:
     for reason in scene.plan.reasons if scene.plan else ("A light field from disk: its views are shown as they are.",):
         quiet(reason)
     for note in scene.notes:
-        quiet(note)
+        quiet(words_of(note))
     return []
 
 

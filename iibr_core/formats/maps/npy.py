@@ -9,16 +9,24 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import PARSE_ERRORS, reason_of, require_file
 from iibr_core.types import InputError
 
-USUAL_NAMES = ("depth", "disparity", "disp", "arr_0", "predicted_depth")
+USUAL_NAMES = (
+    "depth", "disparity", "disp", "metric_depth", "predicted_depth", "pred_depth", "depth_pred", "depth_map", "arr_0",
+)  # fmt: skip
 """Names of the array that is read from an archive of several arrays, the best first."""
 
 
 def read_array(path: Path, max_values: int) -> NDArray[Any]:
     """Return the array of an NPY file, read-only, or the map in an NPZ archive."""
+    return read_named_array(path, max_values)[0]
+
+
+def read_named_array(path: Path, max_values: int) -> tuple[NDArray[Any], str]:
+    """Return the array of an NPY file, read-only, or the map in an NPZ archive; and its name there, "" without."""
     require_file(path)
     try:
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
-        array: NDArray[Any] = stored if isinstance(stored, np.ndarray) else _map_in(path, stored, max_values)
+        is_array = isinstance(stored, np.ndarray)
+        array, name = (stored, "") if is_array else _map_in(path, stored, max_values)
     except InputError:
         raise
     except PARSE_ERRORS as error:
@@ -27,11 +35,11 @@ def read_array(path: Path, max_values: int) -> NDArray[Any]:
         raise InputError(f"{path}: holds {array.dtype} of shape {array.shape}; an array of numbers is expected")
     if array.size > max_values:
         raise InputError(f"{path}: {array.size:,} values are more than {max_values:,}; make it smaller")
-    return array
+    return array, name
 
 
-def _map_in(path: Path, archive: Any, max_values: int) -> NDArray[Any]:
-    """Return the only array of an archive, or the one with a usual name."""
+def _map_in(path: Path, archive: Any, max_values: int) -> tuple[NDArray[Any], str]:
+    """Return the only array of an archive, or the one with a usual name, and its name."""
     with archive:
         names = archive.files
         usual = [name for name in USUAL_NAMES if name in names]
@@ -42,4 +50,4 @@ def _map_in(path: Path, archive: Any, max_values: int) -> NDArray[Any]:
         size_bytes = archive.zip.getinfo(f"{name}.npy").file_size
         if size_bytes > 16 * max_values:
             raise InputError(f"{path}: {name} of {size_bytes:,} bytes is too large; make it smaller")
-        return np.asarray(archive[name])
+        return np.asarray(archive[name]), name

@@ -19,7 +19,7 @@ from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.images.rgbd import GREY_TOLERANCE, MAX_COLORED_SHARE
 from iibr_core.formats.maps.color_maps import values_of_colors
-from iibr_core.formats.maps.npy import read_array
+from iibr_core.formats.maps.npy import read_named_array
 from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
 from iibr_core.formats.maps.writer import KEY, MapText, text_from
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
@@ -40,6 +40,7 @@ class MapFile:
     numbers: how they are stored; "colours" is a map drawn in colours, its place in them, 0..1. largest: the greatest
     integer that could be stored; 1 for others. is_zero: (H, W), where an integer is 0, which may mean unknown; None
     where none is. text: meaning of the values by the file's header, None without. notes: what reading changed.
+    name: of the array in an archive, "" for other files.
     """
 
     values: FloatImage
@@ -48,6 +49,7 @@ class MapFile:
     is_zero: NDArray[np.bool_] | None = None
     text: MapText | None = None
     notes: tuple[str, ...] = ()
+    name: str = ""
 
 
 def read_map(path: Path) -> FloatImage:
@@ -70,10 +72,11 @@ def read_map_file(path: Path) -> MapFile:
     if kind == ".pfm":
         return MapFile(read_pfm(path), "floats")
     if kind in (".npy", ".npz"):
-        array = _read_numpy(path)
+        array, name = _read_numpy(path)
         with np.errstate(over="ignore"):
             values = np.array(array, np.float32)
-        return MapFile(values, "floats") if array.dtype.kind == "f" else _map_of_integers(values, array)
+        found = MapFile(values, "floats") if array.dtype.kind == "f" else _map_of_integers(values, array)
+        return replace(found, name=name)
     return read_map_picture(PictureSource(path))
 
 
@@ -82,7 +85,7 @@ def read_map_size(path: Path) -> ImageSize:
     kind = path.suffix.lower()
     if kind == ".pfm":
         return read_pfm_size(path)
-    return image_size(_read_numpy(path)) if kind in (".npy", ".npz") else source_size(PictureSource(path))
+    return image_size(_read_numpy(path)[0]) if kind in (".npy", ".npz") else source_size(PictureSource(path))
 
 
 def read_map_picture(source: PictureSource) -> MapFile:
@@ -162,12 +165,12 @@ def _grey(pixels: NDArray[Any]) -> NDArray[Any] | None:
     return np.asarray(np.rint(pixels[..., :3].astype(np.float32) @ LUMA))
 
 
-def _read_numpy(path: Path) -> NDArray[Any]:
-    """Return the stored array (H, W), without axes of length 1 beside these."""
-    stored = read_array(path, MAX_FILE_PIXELS)
+def _read_numpy(path: Path) -> tuple[NDArray[Any], str]:
+    """Return the stored array (H, W), without axes of length 1 beside these, and its name in an archive."""
+    stored, name = read_named_array(path, MAX_FILE_PIXELS)
     idle = tuple(axis for axis, side in enumerate(stored.shape) if side == 1)[: max(stored.ndim - 2, 0)]
     values = stored.squeeze(idle)
     if values.ndim != 2 or values.size == 0:
         kind = f"{stored.dtype} of shape {stored.shape}"
         raise InputError(f"{path}: holds {kind}; a depth map is an array of numbers with shape (height, width)")
-    return values
+    return values, name

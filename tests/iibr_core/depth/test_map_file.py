@@ -12,6 +12,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.writer import MapText, write_map
+from iibr_core.remedies import Remedy, remedy_of
 from iibr_core.types import FloatImage, InputError
 
 HEIGHT, WIDTH = 160, 240
@@ -102,6 +103,71 @@ def test_inverse_depth_with_the_name_of_depth_is_recognised(tmp_path) -> None:
     """Many programs write NAME_depth.npy so."""
     np.save(tmp_path / "photo_depth.npy", 3 + 5 * scene()[1])
     assert_true_to_scene(opened(tmp_path, "photo_depth.npy"))
+
+
+def holes() -> np.ndarray:
+    """About a tenth of the map, in patches."""
+    cells = np.random.default_rng(3).random((HEIGHT // 8, WIDTH // 8)) < 0.1
+    return cells.repeat(8, 0).repeat(8, 1)
+
+
+def slope() -> tuple[Image.Image, FloatImage]:
+    """A textured surface whose photo does not show which end is near, and its inverse distance: the left is near."""
+    colors = np.random.default_rng(1).normal(120, 14, (HEIGHT, WIDTH, 3))
+    near = np.tile(np.linspace(1, 1 / 6, WIDTH), (HEIGHT, 1))
+    return Image.fromarray(np.clip(colors, 0, 255).astype(np.uint8)), near.astype(np.float32)
+
+
+def rotated(stored: np.ndarray) -> np.ndarray:
+    return ((stored << 3) | (stored >> 13)).astype(np.uint16)
+
+
+CAMERA_MAPS = {
+    "millimetres": (lambda metres: np.where(holes(), 0, 1000 * metres).astype(np.uint16), 1),
+    "65535 is unknown": (lambda metres: np.where(holes(), 65535, 1000 * metres).astype(np.uint16), 1),
+    "65535 is unknown, in 32 bits": (lambda metres: np.where(holes(), 65535, 1000 * metres).astype(np.int32), 1),
+    "5000 a metre": (lambda metres: 5 * np.where(holes(), 0, 1000 * metres).astype(np.uint16), 1),
+    "7000 a metre": (lambda metres: np.where(holes(), 0, 7000 * metres).astype(np.uint16), 7),
+    "rotated bits": (lambda metres: rotated(np.where(holes(), 0, 1500 * metres).astype(np.uint16)), 1.5),
+    "millimetres of 32 bits, without holes": (lambda metres: (1000 * metres).astype(np.uint32), 1),
+    "half floats": (lambda metres: np.where(holes(), 0, metres).astype(np.float16), 1),
+}
+"""Numbers of a depth camera's map by metres, and the ratio of the distances that are read to the true ones."""
+
+
+@pytest.mark.parametrize("shows_near_end", [True, False])
+@pytest.mark.parametrize("kind", CAMERA_MAPS)
+def test_maps_of_depth_cameras_are_distances_by_their_numbers(tmp_path, kind, shows_near_end) -> None:
+    photo, near = scene() if shows_near_end else slope()
+    numbers, ratio = CAMERA_MAPS[kind]
+    near = near + 0.2
+    np.save(tmp_path / "photo_depth.npy", numbers(1 / near))
+    found = opened(tmp_path, "photo_depth.npy", photo).disparity
+    slope_, offset = found.inverse_metres
+    known = ~holes()
+    np.testing.assert_allclose((slope_ * found.values + offset)[known], near[known] / ratio, rtol=0.01, atol=0.004)
+    assert found.unknown is None or not found.unknown[known].any()
+
+
+def test_doubt_about_the_near_end_names_both_ways_out(tmp_path) -> None:
+    photo, near = slope()
+    integers(1 - near, np.uint8).save(tmp_path / "photo_depth.png")
+    (note,) = opened(tmp_path, "photo_depth.png", photo).disparity.notes
+    assert "white counts as near, as usual, in doubt" in note
+    assert remedy_of(note) is Remedy.INVERT_OR_METRIC
+
+
+@pytest.mark.parametrize("name", ["depth", "predicted_depth"])
+def test_an_array_that_is_named_depth_holds_distances(tmp_path, name) -> None:
+    photo, near = slope()
+    np.savez(tmp_path / "a.npz", **{name: 1 / near, "focallength_px": 500.0})
+    values = opened(tmp_path, "a.npz", photo).disparity.values
+    assert values[80, 10] > values[80, 230]
+    np.save(tmp_path / "a.npy", 1 / near)
+    notes = opened(tmp_path, "a.npy", photo).disparity.notes
+    assert any("metric" in note and remedy_of(note) is Remedy.INVERT_OR_METRIC for note in notes)
+    values = opened(tmp_path, "a.npy", photo, is_metric=True).disparity.values
+    assert values[80, 10] > values[80, 230]
 
 
 def test_a_sky_of_zeros_is_far_away_and_scattered_zeros_are_unknown(tmp_path) -> None:

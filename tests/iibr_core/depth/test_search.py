@@ -9,6 +9,7 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.models import cache as estimate_cache
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.picture import upright
+from iibr_core.remedies import Remedy, remedy_of
 from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
@@ -106,7 +107,7 @@ def test_maps_that_are_not_used_are_named(tmp_path) -> None:
     assert open_with_depth(path).origin.kind == "rough"
     (tmp_path / "scene_depth.png").write_bytes(files.picture(DEPTH[:40, :40], "PNG"))
     (failure,) = open_with_depth(path).origin.failures
-    assert "stretch it" in failure
+    assert remedy_of(failure) is Remedy.STRETCH
 
 
 @pytest.mark.parametrize("depth", [b"no picture", files.picture(DEPTH, "PNG")[:-30], DEPTH[:, :20]])
