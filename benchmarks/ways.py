@@ -37,6 +37,7 @@ def iibr(scene: Scene, stages: Stages = ALL_STAGES, refines: bool = True) -> Mak
     if refines:
         disparity = refine(scene.photo, disparity, stages=stages, is_enlarged=scene.is_enlarged)
     views = ViewMaker(scene.photo, disparity, scene.field, stages=stages)
+    _ = views.rays  # made now: `compare` counts the time of this once
     return lambda at: views.view(at).colors
 
 

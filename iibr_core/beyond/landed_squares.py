@@ -77,7 +77,7 @@ def draw_rays(
     for k, matrix in enumerate(matrices):
         # The photo's rays have precedence over inpainted ones beside them.
         ahead = surface if k >= rays.photo_images else 0.0
-        _draw_rays(rays.arrays, k, landing[k], matrix, ahead, sealed_step, first, nearest, source)
+        _draw_rays(rays.arrays, k, landing[k], matrix, ahead, sealed_step, first, (nearest, source))
     return nearest, source
 
 
@@ -94,11 +94,13 @@ def project(m, x, y, d):
 
 
 @kernel
-def _draw_rays(rays, index, landing, m, ahead, sealed_step, first_row, nearest, source):
-    """Draw the rays of one image. ahead: least difference of disparities by which they hide the photo's rays."""
+def _draw_rays(rays, index, landing, m, ahead, sealed_step, first_row, target):
+    """Draw the rays of one image. ahead: least difference of disparities by which they hide the photo's rays. target:
+    disparity and source of the samples.
+    """
     disparity, coverage = rays.disparity[index], rays.coverage[index]
     height, width = disparity.shape
-    last_row = first_row + len(nearest) // SAMPLES - 1
+    last_row = first_row + len(target[0]) // SAMPLES - 1
     corners, is_drawn = np.empty((width, 4, 3)), np.empty(width, np.bool_)
     is_near = np.empty(landing.shape[1], np.bool_)
     for y in range(height):
@@ -115,7 +117,7 @@ def _draw_rays(rays, index, landing, m, ahead, sealed_step, first_row, nearest, 
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
             _land_squares(disparity, m, y, sealed_step, corners, is_drawn)
-            _draw_squares(corners, is_drawn, coverage[y], index, rays.photo_images, ahead, first_row, nearest, source)
+            _draw_squares(corners, is_drawn, coverage[y], index, rays.photo_images, ahead, first_row, target)
 
 
 @kernel
@@ -155,8 +157,9 @@ def _land_squares(disparity, m, y, sealed_step, corners, is_drawn):
 
 
 @kernel
-def _draw_squares(corners, is_drawn, coverage, index, photo_images, ahead, first_row, nearest, source):
+def _draw_squares(corners, is_drawn, coverage, index, photo_images, ahead, first_row, target):
     """Draw each pixel as two triangles from where its corners landed: disparity is linear over planes."""
+    nearest, source = target
     rows, columns = nearest.shape
     for x in range(len(corners)):
         if not is_drawn[x]:

@@ -50,7 +50,7 @@ class ViewFit:
             return np.full_like(estimate, self.plane)
         share = (estimate - np.float32(low)) / np.float32(high - low)
         small = _smaller(share[..., None], self._step)[..., 0]
-        # From the best plane the range opens to either side, whichever end is near.
+        # The range opens from the best plane to either side, because either end may be near.
         middle = self.plane / (self._unit * self._step)
         simplex = middle + np.array([[0, 0], [-1, 1], [1, 1]]) * 0.01
         far, near = minimize(

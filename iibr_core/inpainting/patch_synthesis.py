@@ -57,7 +57,7 @@ def copy_patches(
     shown = np.zeros((len(pixels), 4), np.float32)
     for blocks in _blocks_apart(pixels, image_size(hole)):
         in_pieces(
-            lambda block: _copy_block(colors, disparity, hole, number, *block, np.float32(one_surface), trust, shown),
+            lambda block: _copy_block(colors, disparity, hole, number, block, np.float32(one_surface), trust, shown),
             blocks, threads,
         )  # fmt: skip
     counts = shown[:, 3:]
@@ -81,14 +81,14 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 
 
 @kernel
-def _copy_block(colors, disparity, hole, number, row, column, one_surface, trust, shown):
-    """Copy patches into the holes of a block.
+def _copy_block(colors, disparity, hole, number, block, one_surface, trust, shown):
+    """Copy patches into the holes of a block (row, column).
 
     trust (N,): trust in each hole pixel, 0 before it is copied. shown (N, 4): weighted sum of the patches over each
     hole pixel, and the sum of their weights.
     """
     height, width = number.shape
-    top, left = row * PATCH_BLOCK_PX, column * PATCH_BLOCK_PX
+    top, left = block[0] * PATCH_BLOCK_PX, block[1] * PATCH_BLOCK_PX
     bottom, right = min(top + PATCH_BLOCK_PX, height), min(left + PATCH_BLOCK_PX, width)
     queue, end = np.empty(PATCH_BLOCK_PX**2, np.int64), 0
     is_queued = np.zeros((PATCH_BLOCK_PX, PATCH_BLOCK_PX), np.bool_)

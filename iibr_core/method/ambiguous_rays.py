@@ -221,7 +221,7 @@ def _pick_apart(near_disparity, near_source, n, parallax, disparity, source, sha
         foreground = np.argmax(near_disparity[:n])
         disparity[0], source[0], share[0] = near_disparity[foreground], near_source[foreground], 0.0
         picked = 1
-    # How far what is near lies from what is picked.
+    # Differences between near and picked disparities.
     away = np.full(len(AROUND), np.inf)
     compared = 0
     while 0 < picked < len(disparity) - 1:
@@ -269,7 +269,7 @@ def _lay_out(landed, every, found):
         # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
         disparity[picked], source[picked], share[picked] = disparity[mixed], source[mixed], 0.0
         found.number[ray] = picked + 1
-        # How near each surface lands: 0 on the ray itself, else by the first landing like it.
+        # Distance at which each surface lands: 0 on the ray itself, else that of the first landing of it.
         for j in range(picked + 1):
             found.nearest[ray, j] = 0.0 if share[j] > 0 else NOWHERE_PX
             if share[j] > 0:
@@ -393,7 +393,7 @@ def _blend(rays, offsets, found, weights, colors):
                 r, g, b = cubic(images, k, x, y)
             else:
                 r, g, b = cubic_on_surface(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))
-            # How far the votes differ; the first is kept as it is.
+            # Differences of the votes from the first one, which is kept.
             if total == 0.0:
                 first_r, first_g, first_b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
             apart = max(apart, abs(r - first_r), abs(g - first_g), abs(b - first_b))
@@ -402,7 +402,7 @@ def _blend(rays, offsets, found, weights, colors):
             red += w * linear_scalar(r)
             green += w * linear_scalar(g)
             blue += w * linear_scalar(b)
-        # To linear light and back costs the last digits: votes that agree do without.
+        # Conversion to linear light and back changes the last digits, so votes that agree are not converted.
         colors[n, 0], colors[n, 1], colors[n, 2] = first_r, first_g, first_b
         if apart > SAME_COLOR:
             colors[n, 0] = srgb_scalar(red / total)

@@ -62,7 +62,7 @@ def find_candidates(
     first_row, last_row = rows
     columns = columns or (0, rays.size.width)
     offset = ViewOffset(*map(float, offset))  # kernels are compiled for one kind of offset
-    # Where one smooth surface shows, rays are traced back cell by cell; elsewhere source rays are splatted.
+    # In cells with one smooth surface, rays are traced back; in all others, source rays are splatted.
     smooth, about = find_smooth_cells(rays, offset, rows, columns)
     splat = cells_in(columns, smooth.shape) & ~smooth
     shape = (SLOTS, last_row - first_row, rays.size.width)
@@ -168,7 +168,7 @@ def _land_rays(rays, index, steepness, needed, columns, to_view, found):
                         # Unsigned: never counted from the end.
                         row, column = np.uint64(target_y - first_row), np.uint64(target_x)
                         used = np.int64(count[row, column])
-                        # The photo has landed: nobody sees what lies behind a surface of it that covers the pixel.
+                        # The photo has landed: a surface that covers the pixel hides all surfaces behind it.
                         if index > 0 and used > 0:
                             covered = coverage[0, row, column]
                             if covered >= COVERED and disparity[0, row, column] > (d_here + tolerance) * covered:

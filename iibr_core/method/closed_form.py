@@ -49,7 +49,7 @@ def _composite_front_to_back(candidates, weights, covered):
                 # Nothing behind, or the pixel is full.
                 if foreground < 0 or left <= 0:
                     break
-                # "Over": this surface takes what is left, as far as it covers the pixel.
+                # The operator "over": this surface takes its coverage of the remaining share.
                 ahead, ahead_slot = disparity[foreground, row, x], foreground
                 weights[foreground, row, x] = min(coverage[foreground, row, x], left)
                 left -= weights[foreground, row, x]

@@ -87,7 +87,7 @@ def _measure(rows, first, last, detail):
         for x in range(detail.shape[1]):
             detail[y, x] = 0.0
             for k in range(3 * x, 3 * x + 3):
-                # Of what is infinite nobody can say; NaN fails the comparison.
+                # Infinite values cannot be compared: their difference is NaN, which fails the test.
                 if detail[y, x] < stands_out[k] < np.inf:
                     detail[y, x] = stands_out[k]
 

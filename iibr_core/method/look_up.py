@@ -130,13 +130,13 @@ def cubic_on_surface(images, surfaces, index, x, y, d, parallax):
     # The whole kernel: its weights sum to 1, and it may overshoot as everywhere.
     if taps == 16:
         return np.float64(red), np.float64(green), np.float64(blue)
-    # The surface is nowhere near: the photo as it is.
+    # No tap lies on the surface: the plain kernel is used.
     if taps == 0:
         return cubic(images, index, x, y)
     # Next to no weight, or a negative one, is left: dividing by it would blow up noise.
     if total < MIN_TAP_WEIGHT:
         return _nearest_tap(images, surfaces, k, x, y, own, tolerance)
-    # Normalised over what is left; without the other lobes it may overshoot far, hence the range.
+    # Normalised over the remaining taps. Without the other lobes it may overshoot, so it is clipped to their range.
     return (
         np.float64(min(max(red / total, low_r), high_r)),
         np.float64(min(max(green / total, low_g), high_g)),
@@ -261,7 +261,7 @@ def _look_up_others(rays, offsets, candidates, weights, wanted, first_y, first_x
             if used == 0:
                 colors[v, u, 0], colors[v, u, 1], colors[v, u, 2] = 0.0, 0.0, 0.0
                 continue
-            # Weights of a ray sum to what is covered of it; the heaviest candidate gives its disparity and source.
+            # The weights of a ray sum to its coverage; the heaviest candidate gives its disparity and source.
             total, heavy = 0.0, 0
             for k in range(used):
                 total += weights[k, row, x]
@@ -284,7 +284,7 @@ def _look_up_others(rays, offsets, candidates, weights, wanted, first_y, first_x
                 t, s = offsets[index, 0], offsets[index, 1]
                 source_x = min(max(x + d * s, -0.5), width - 0.5)
                 source_y = min(max(first_row + row + d * t, -0.5), height - 0.5)
-                # Where an edge is near, only pixels of its own surface; else the plain kernel, which needs no tests.
+                # Near an edge, only pixels of the same surface count; elsewhere the plain kernel needs no tests.
                 parallax = max(abs(s), abs(t), 1e-9)
                 if not near_edge[index, max(floor(source_y), 0), max(floor(source_x), 0)]:
                     r, g, b = cubic(images, index, source_x, source_y)

@@ -84,7 +84,7 @@ def _move(disparity, least_step, most_step, first, last, moved):
                 if disparity[v, u] > foreground:
                     foreground = disparity[v, u]
                     beyond = disparity[min(max(v + down, 0), height - 1), min(max(u + right, 0), width - 1)]
-            # A slope goes on, on either side.
+            # On a slope, disparity changes on either side of the step, too.
             step = foreground - here
             goes_on = max(here - background, beyond - foreground) > SLOPE_SHARE * step
             moved[y, x] = foreground if least_step < step <= most_step and not goes_on else here
@@ -108,7 +108,7 @@ def _mark_edge_bands(disparity, edge_step, first, last, is_edge_band):
 @kernel
 def _is_beside_edge(above, here, below, left, x, right, edge_step):
     own = here[x]
-    # Without branches, as `_mark_edge_bands` says.
+    # Without branches, so that `_mark_edge_bands` is vectorised.
     is_above = (abs(above[left] - own) > edge_step) | (abs(above[x] - own) > edge_step)
     is_below = (abs(below[left] - own) > edge_step) | (abs(below[x] - own) > edge_step)
     is_above |= abs(above[right] - own) > edge_step
@@ -222,10 +222,10 @@ def _split_rows(colors, disparity, is_edge_band, edge_step, rows, split):
                         expected += contrast[c] * precision[c, e] * (here[e] - mean[0, e])
                 share = min(max(expected / fits, 0.0), 1.0 - MIN_MATTE)
                 _mixture_precision(spread, share, precision)
-            # Colours that are not finite tell nothing.
+            # Colours that are not finite give no share.
             if not share >= MIN_MATTE:
                 continue
-            # What is left goes to both by how far they spread: so both together are the pixel again.
+            # The residual is divided by the spread of both colours, so that their mixture is the pixel again.
             off = here - mean[0] - share * contrast
             for c in range(3):
                 background, fore = mean[0, c], mean[1, c]
@@ -235,8 +235,8 @@ def _split_rows(colors, disparity, is_edge_band, edge_step, rows, split):
                         background + (1.0 - share) * spread[0, c, e] * part,
                         fore + share * spread[1, c, e] * part,
                     )
-                # Nothing is darker than black, and what is behind neither darker nor brighter than its surface all
-                # around, as a small share of it may seem: the other part takes what is left.
+                # The foreground is not darker than black, and the background within the range of its surface
+                # around; a small share may give other colours. The other part takes the rest.
                 if fore < 0.0:
                     background, fore = here[c] / (1.0 - share), 0.0
                 if not darkest[c] <= background <= brightest[c]:

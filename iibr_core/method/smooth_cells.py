@@ -98,7 +98,7 @@ def _land_cells(cells, rough, offsets, first_cell, photo_images, parallax, range
                     continue
                 for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
                     for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
-                        # Smooth cells widen the range of what lands; anything else there asks for splatting.
+                        # Smooth cells widen the range of landing disparities; all other cells need splatting.
                         if k == 0 and not rough[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
@@ -152,7 +152,7 @@ def backward_warp(surface, offset, about, found):
             left, right = first * CELL_PX, min(cell * CELL_PX, width)
             # Rows above the band are followed too, so that the results do not depend on where it begins.
             for row in range(top, bottom):
-                # From what the row before came to.
+                # The iteration starts from the result of the row before.
                 is_settled[left:right] = False
                 for _ in range(MAX_ROUNDS):
                     if not _follow(surface, guess, is_settled, left, right, first_row + row, t, s):

@@ -115,7 +115,7 @@ class Renderer:
         view.inpainted[shown] = view.occluded[shown] | (found.source[inner] >= rays.photo_images)
         if not self.transformer:
             return None
-        # What lies behind rays that are covered in part is composited, not decided.
+        # Rays that are covered in part are composited over their background, not decided.
         settled = ~wanted | (share < max(_min_coverage(rays), MIN_COVERED))
         ambiguous = find_ambiguous_rays(rays, candidates, weights, found, (above, above + last - first), settled)
         raise_if_stopped()

@@ -39,7 +39,7 @@ def fit_to_blur(photo: FloatImage, values: FloatImage, sharp: FloatImage, sigma:
     fitted, missing, settled = sharp.copy(), np.empty_like(sharp), sharp == values
     in_bands(lambda first, last: _find_missing(values, fitted, taps, first, last, missing), image_size(values))
     for _ in range(SWEEPS):
-        # Band after band: each move changes what is missing for the next.
+        # Bands are processed one after the other: each move changes `missing` for the next one.
         in_bands(
             lambda first, last: _move_edges(photo, fitted, missing, taps, min_edge, (first, last), settled),
             image_size(values),

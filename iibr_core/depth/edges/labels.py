@@ -166,7 +166,9 @@ def _mean_field(
     drive, votes = drive.copy(), np.empty((len(pixels), 8), np.float32)
     belief = np.ones(len(pixels), np.float32)
     firsts = range(0, len(pixels), PIECE_PIXELS)
-    in_pieces(partial(_count_votes, colors, values, pixels, number, other, alike, drive, votes), firsts, tiling.THREADS)
+    in_pieces(
+        partial(_count_votes, colors, values, pixels, number, other, alike, (drive, votes)), firsts, tiling.THREADS
+    )
     for _ in range(PASSES):
         previous, belief = belief, np.empty_like(belief)
         in_pieces(partial(_update_beliefs, pixels, number, drive, votes, previous, belief), firsts, tiling.THREADS)
@@ -299,13 +301,13 @@ def _mixed_likelihood(color, weight, total, back_squares, back, alike):
 
 
 @kernel
-def _count_votes(colors, values, pixels, number, other, alike, drive, votes, first):
+def _count_votes(colors, values, pixels, number, other, alike, results, first):
     """Write the votes of eight neighbours (N, 8) for PIECE_PIXELS pixels from the first on.
 
     A neighbour's vote is its effect if it is on its surface rather than on its other one; its vote on the other one is
-    added to drive (N).
+    added to drive (N). results: drive and votes.
     """
-    height, width = values.shape
+    (height, width), (drive, votes) = values.shape, results
     for n in range(first, min(first + PIECE_PIXELS, len(pixels))):
         y, x = pixels[n] // width, pixels[n] % width
         value, half = values[y, x], 0.5 * abs(other[n] - values[y, x])

@@ -127,8 +127,9 @@ def _with_steps(values: FloatImage, sigma: float, min_edge: float) -> FloatImage
 
 
 @kernel
-def _continued(values, x, y, across, down, far, sigma, share, limit):
+def _continued(values, x, y, along, far, sigma, share, limit):
     """Return the height at (x, y) of a surface that begins at a distance along the line, by a share of its slope."""
+    across, down = along
     level = height_at(values, x + across * far, y + down * far)
     slope = (height_at(values, x + across * (far + sigma), y + down * (far + sigma)) - level) / sigma
     return level - share * far * min(max(slope, -limit), limit)
@@ -174,8 +175,8 @@ def _step_value(values, x, y, across, down, sigma, min_edge):
         return here
     # Slopes of the plateaus continue part of the distance to the pixel, but not past its value.
     limit = MAX_EXTENSION * steepest
-    top = max(_continued(values, x, y, across, down, up, sigma, EXTENSION, limit), here)
-    bottom = min(_continued(values, x, y, -across, -down, to_foot, sigma, EXTENSION, limit), here)
+    top = max(_continued(values, x, y, (across, down), up, sigma, EXTENSION, limit), here)
+    bottom = min(_continued(values, x, y, (-across, -down), to_foot, sigma, EXTENSION, limit), here)
     if not top > bottom:
         return here
     is_above = 2.0 * here >= top + bottom
@@ -184,10 +185,10 @@ def _step_value(values, x, y, across, down, sigma, min_edge):
     above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), GAUSSIAN_SIGMAS * sigma
     step, limit = height / (1.0 - above - below), BEND * limit
     if not returns_up:
-        lost = _continued(values, x, y, across, down, end + edge, sigma, BEND, limit) - top
+        lost = _continued(values, x, y, (across, down), end + edge, sigma, BEND, limit) - top
         top += min(max(lost, 0.0), above * step)
     if not returns_down:
-        left = bottom - _continued(values, x, y, -across, -down, end - edge, sigma, BEND, limit)
+        left = bottom - _continued(values, x, y, (-across, -down), end - edge, sigma, BEND, limit)
         bottom -= min(max(left, 0.0), below * step)
     return top if is_above else bottom
 

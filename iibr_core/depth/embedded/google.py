@@ -131,7 +131,7 @@ def _estimate(stored: FloatImage, confidence: FloatImage | None, properties: Pro
         else:
             inverse = 1 / (ends[0] + values * (ends[1] - ends[0]))
     inverse[~np.isfinite(inverse)] = np.nan
-    # Zeros of confidence are not quite 0 in JPEGs; a map that is sure of nothing says nothing.
+    # In JPEGs, a confidence of zero is stored as nearly 0. A map without any confidence is ignored.
     if confidence is not None and confidence.shape == stored.shape and (confidence >= 0.05).any():
         inverse[confidence < 0.05] = np.nan
     units = {"m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 0.001, "millimeter": 0.001, "millimetre": 0.001}

@@ -29,7 +29,7 @@ def cache_folder() -> Path:
 
 def key_of(pixels: FloatImage, files: Iterable[Path]) -> str:
     """Return a name for a model's estimate of a picture (H, W, 3), by path, size and time of each of its files."""
-    digest = hashlib.sha256(f"2 {pixels.shape}".encode())  # raise the number when estimates mean something else
+    digest = hashlib.sha256(f"2 {pixels.shape}".encode())  # raise the number when the meaning of estimates changes
     for file in files:
         status = file.stat() if file.is_file() else None
         digest.update(os.fsencode(file.resolve()))

@@ -132,7 +132,7 @@ def register(path: Path) -> LocalModel:
         raise InputError(f"{path}: only ONNX files are copied; use this folder itself as the depth model")
     file = model.weights[0].resolve()
     onnx.picture_input(onnx.open_session(file), file)
-    # Those from the Hugging Face hub are named after their folders.
+    # Models from the Hugging Face hub are named after their folders.
     name = model.folder.resolve().name if file.stem in ("model", "onnx") else file.stem
     if any(known.name == name for known in KNOWN_MODELS):
         raise InputError(f"{path}: {name} is the name of a published model; rename the file")

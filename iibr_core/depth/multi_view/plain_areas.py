@@ -123,7 +123,7 @@ def _move_back(costs, colors, disparities, steps, limits, refuted, weights, valu
             continue
         totals[:] = sums[:] = 0
         size, plain = _flood(start, colors, steps, refuted, weights, values, queue, is_known, totals, sums)
-        # The ends of the range hold what is beyond it.
+        # Disparities beyond the range are counted at its ends.
         totals[0] = totals[count - 1] = 0
         level = _farthest_level(totals)
         if size < MIN_PIXELS or plain < MIN_PLAIN_SHARE * size or level < 0:

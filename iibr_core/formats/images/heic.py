@@ -44,7 +44,7 @@ def heic_pair(path: Path) -> tuple[int, int] | None:
         items = [item for (item,) in struct.iter_unpack(">I", groups[0][GROUP_HEADER_BYTES:])] if groups else []
         primary = int.from_bytes(meta[b"pitm"][4:], "big")
     except PARSE_ERRORS:
-        return None  # whoever decodes the photo says so
+        return None  # the decoder of the photo reports the damage
     if not groups:
         return None
     if len(items) != 2 or items[0] == items[1]:

@@ -121,7 +121,7 @@ def _resample(values, tolerance, place, result):
                             low = values[row, column]
                         if values[row, column] > high:
                             high = values[row, column]
-            # If so, the middle of the range parts near from far; else all counts as near.
+            # If it does, the middle of the range separates near from far; else all values count as near.
             split = (low + high) / 2 if high - low > tolerance else -np.inf
             # Weighted means of both surfaces, and how much is unknown.
             far, far_weight, near, near_weight, unknown_weight = 0.0, 0.0, 0.0, 0.0, 0.0
