@@ -2,9 +2,10 @@
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ HARMLESS_MESSAGE = "extraneous bytes"
 """Complaint of the JPEG decoder about padding, which some cameras write; nothing is lost."""
 NO_READER = "could not find a format reader"
 """Complaint of OpenImageIO about a file of unknown kind."""
+TEXT_NAMES = ("ImageDescription", "iibr:settings", "iibr:Lenslet")
+"""Names of the texts in a header that this program reads. OpenImageIO's own records must not outlive the program."""
 FLOATING_TYPES = ("half", "float", "double")
 WIDE_TYPES = {"int16": "int16", "int": "int32", "uint": "uint32"}
 """NumPy's names of types whose integers are scaled by their own range, by the names that OpenImageIO gives to them."""
@@ -57,23 +60,24 @@ class _Stored(NamedTuple):
 
 
 class Header(NamedTuple):
-    """Header of a picture. size: as stored. orientation: Exif's, 1 to 8. spec: OpenImageIO's record, None without."""
+    """Header of a picture. size: as stored. orientation: Exif's, 1 to 8. texts: those of TEXT_NAMES, by name."""
 
     size: ImageSize
     orientation: int = 1
-    spec: Any = None
+    texts: Mapping[str, str] = MappingProxyType({})
 
     def text(self, name: str) -> str:
         """Return a text; "" where it is missing or damaged, and for files that OpenImageIO does not read."""
-        return "" if self.spec is None else text_attribute(self.spec, name)
+        return self.texts.get(name, "")
 
 
 def oiio_header(path: Path, number: int) -> Header:
     """Return the header of a picture that OpenImageIO reads; Pillow reads further ones of a file."""
     if number:
         return pillow_header(path, number)
-    spec = oiio.ImageSpec(_open(path).spec())  # a copy: its own does not outlive the open file
-    return Header(ImageSize(spec.height, spec.width), int(spec.get_int_attribute("Orientation", 1)), spec)
+    spec = _open(path).spec()
+    texts = {name: text_attribute(spec, name) for name in TEXT_NAMES}
+    return Header(ImageSize(spec.height, spec.width), int(spec.get_int_attribute("Orientation", 1)), texts)
 
 
 def pillow_header(path: Path, number: int) -> Header:

@@ -3,6 +3,8 @@
 import ctypes
 import os
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,6 +41,14 @@ def test_a_photo_and_its_map_are_opened_a_few_times_only(tmp_path, name, most) -
     write_pfm(tmp_path / "photo_disparity.pfm", disparity.values)
     source = Source(str(tmp_path / "photo.png"))
     assert 1 <= opens_of(tmp_path / name, lambda: load_photo(source)) <= most
+
+
+def test_a_program_that_looked_at_a_picture_ends_silently(tmp_path) -> None:
+    Image.new("RGB", (8, 6)).save(tmp_path / "a.png")
+    code = "from pathlib import Path; from iibr_core.formats.images.open_picture import open_picture as o"
+    code += f"; print(o(Path({str(tmp_path / 'a.png')!r})).size)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("8x6\n", "")
 
 
 def test_a_file_in_the_place_of_another_is_looked_at_again(tmp_path) -> None:
