@@ -75,8 +75,11 @@ def gdepth_segments(
     return [STANDARD + packet(about | {f"{NOTE} HasExtendedXMP": guid}), *parts]
 
 
-def dynamic_depth_jpeg(photo, depth, *, before=b"", between=b"", behind=b"", shared_container=False):
-    """Return a Dynamic Depth 1.0 photo.
+ORIGINAL = "android/original_image"
+
+
+def dynamic_depth_jpeg(photo, depth, *, before=b"", between=b"", behind=b"", original=b"", shared_container=False):
+    """Return a Dynamic Depth 1.0 photo. original: the picture before it was blurred.
 
     before: an item that precedes the depth map. between: a trailer between photo and items. behind: one behind all.
     """
@@ -85,6 +88,10 @@ def dynamic_depth_jpeg(photo, depth, *, before=b"", between=b"", behind=b"", sha
     item = "1.0/container/item/" if shared_container else "dd/1.0/item/"
     entries = [("image/jpeg", "Primary", len(photo) if shared_container else 0, "primary")]
     entries += [("image/jpeg", "GainMap", len(before), "gain")] if before else []
+    if original:  # phones of today state a meaning, the specification of 2019 a name
+        entries += [
+            ("image/jpeg", *(("Original", len(original), "") if shared_container else ("", len(original), ORIGINAL)))
+        ]
     entries += [("image/png", "Depth", len(depth), "android/depthmap")]
     listed = "".join(
         f'<rdf:li rdf:parseType="Resource"><C:Item I:Mime="{mime}" I:Semantic="{semantic}" I:Length="{size}"'
@@ -99,7 +106,7 @@ def dynamic_depth_jpeg(photo, depth, *, before=b"", between=b"", behind=b"", sha
         "<M:Format>RangeInverse</M:Format><M:Near>2.0</M:Near><M:Far>10.0</M:Far><M:Units>Meters</M:Units>"
         "<M:DepthURI>android/depthmap</M:DepthURI></K:DepthMap></D:Camera></rdf:li></rdf:Seq></D:Cameras>",
     )
-    return with_segments(photo, [STANDARD + xmp]) + between + before + depth + behind
+    return with_segments(photo, [STANDARD + xmp]) + between + before + original + depth + behind
 
 
 def apple_jpeg(photo: bytes, depth: np.ndarray, low: object, high: object, kind: str = "disparity") -> bytes:
@@ -110,13 +117,14 @@ def apple_jpeg(photo: bytes, depth: np.ndarray, low: object, high: object, kind:
     return photo + with_segments(picture(depth), [STANDARD + packet(about)])
 
 
-def samsung_jpeg(photo: bytes, depth: np.ndarray, audio: bool = False) -> bytes:
+def samsung_jpeg(photo: bytes, depth: np.ndarray, audio: bool = False, sharp: bytes = b"") -> bytes:
     """Return a "Live focus" photo with Samsung's trailer; depth (H, W) uint8, dark is near."""
     extra = bytes(32) + b"\x03\0\xff\xff" + struct.pack("<II", *depth.shape[::-1]) + bytes(64)
     blocks = [
         (0x0A01, b"Image_UTC_Data", b"1234567890123"),
         (0x0AB1, b"DualShot_DepthMap_1", depth.tobytes()),
         (0x0AB3, b"DualShot_Extra_Info", extra),
+        *([(0x0AB0, b"DualShot_1", sharp)] if sharp else []),
     ]
     body, places = b"", []
     for kind, name, content in blocks:
@@ -191,12 +199,12 @@ def disc_scene() -> tuple[np.ndarray, np.ndarray]:
     return pixels.astype(np.uint8), np.where(disc, 230, 20 + y // 2).astype(np.uint8)
 
 
-def huawei_jpeg(photo: bytes, stored: np.ndarray, orientation: int = 0) -> bytes:
+def huawei_jpeg(photo: bytes, stored: np.ndarray, orientation: int = 0, sharp: bytes = b"") -> bytes:
     """A "wide aperture" photo: the shown and the sharp picture, then the map (h, w) uint8 as it is stored."""
     header = bytearray(68)
     header[7] = orientation
     header[16:20] = struct.pack("<HH", stored.shape[1], stored.shape[0])
-    return photo + photo + b"\x56\xe9edof" + bytes(header) + stored.tobytes()
+    return photo + (sharp or photo) + b"\x56\xe9edof" + bytes(header) + stored.tobytes()
 
 
 def avif(pixels: np.ndarray, depth: np.ndarray, orientation: int = 1) -> bytes:

@@ -10,10 +10,23 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
-from iibr_core.depth.embedded.google import all_in_focus, dynamic_depth_estimate, gdepth_estimate, range_notes
+from iibr_core.depth.embedded.google import (
+    all_in_focus,
+    dynamic_depth_estimate,
+    dynamic_original,
+    gdepth_estimate,
+    range_notes,
+)
 from iibr_core.depth.embedded.images import PICTURE_STARTS, decode_map
 from iibr_core.depth.embedded.jpeg import HEADER_BYTES, JPEG_START, appended_pictures, jpeg_layout, xmp_of
-from iibr_core.depth.embedded.trailers import huawei_estimate, samsung_estimate, second_picture_estimate, thumbnail_of
+from iibr_core.depth.embedded.trailers import (
+    huawei_estimate,
+    samsung_estimate,
+    samsung_in_focus,
+    second_in_focus,
+    second_picture_estimate,
+    thumbnail_of,
+)
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_depth_file
@@ -104,10 +117,24 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
             continue
         if estimate is not None:
             notes = range_notes(xmp) if name in (GDEPTH, DYNAMIC_DEPTH) else ()
-            return EmbeddedDepth(estimate, name, all_in_focus(xmp) if name == GDEPTH else None, notes)
+            return EmbeddedDepth(estimate, name, _in_focus(name, xmp, data, layout.end), notes)
     if damage is not None:
         raise damage
     return None
+
+
+def _in_focus(name: str, xmp: Element, data: bytes, end: int) -> bytes | None:
+    """Return the file of the picture before the camera blurred it, b"" if it is damaged, None without."""
+    finders: dict[str, Callable[[], bytes | None]] = {
+        DYNAMIC_DEPTH: lambda: dynamic_original(xmp, data, end),
+        GDEPTH: lambda: all_in_focus(xmp),
+        SAMSUNG: lambda: samsung_in_focus(data),
+    }
+    try:
+        found = finders.get(name, lambda: None)()
+    except InputError:
+        return b""
+    return second_in_focus(data, end) if found is None and name in (HUAWEI, SECOND_PICTURE, GDEPTH) else found
 
 
 def leia_estimate(data: bytes) -> DepthEstimate | None:
@@ -220,11 +247,13 @@ def _in_heic(path: Path) -> EmbeddedDepth | None:
     if depth is not None:
         return EmbeddedDepth(heic_estimate(*depth), "Apple portrait")
     with open_binary(path) as file:
-        found = samsung_estimate(file.read(MAX_FILE_BYTES))
+        data = file.read(MAX_FILE_BYTES)
+    found = samsung_estimate(data)
     if found is None:
         return None
     # A HEIC's photo is always read upright.
-    return EmbeddedDepth(DepthEstimate(upright(found.values, heic_orientation(path)), "inverse depth"), SAMSUNG)
+    turned = DepthEstimate(upright(found.values, heic_orientation(path)), "inverse depth")
+    return EmbeddedDepth(turned, SAMSUNG, samsung_in_focus(data))
 
 
 def _in_lfp(path: Path) -> EmbeddedDepth | None:

@@ -26,6 +26,9 @@ DEPTH_MAP = "http://ns.google.com/photos/dd/1.0/depthmap/"
 ITEM_TAGS = tuple(f"{{http://ns.google.com/photos/{version}/container/}}Item" for version in ("dd/1.0", "1.0"))
 ITEMS = ("http://ns.google.com/photos/dd/1.0/item/", "http://ns.google.com/photos/1.0/container/item/")
 
+ORIGINAL_ENDS = ("original_image", "/original")
+"""Ends of the names of the picture before the camera blurred it, such as "android/original_image"."""
+
 Properties = dict[str, str]
 
 
@@ -57,6 +60,16 @@ def dynamic_depth_estimate(xmp: Element, data: bytes, end: int) -> DepthEstimate
     return _estimate(stored, None if sure is None else decode_map(sure, "its confidence"), described)
 
 
+def dynamic_original(xmp: Element, data: bytes, end: int) -> bytes | None:
+    """Return the file of the picture before the camera blurred it, from such a container; None without.
+
+    Raises InputError if it is damaged.
+    """
+    uris = (item[0] for item in _items(xmp))
+    uri = next((uri for uri in uris if uri.lower().endswith(ORIGINAL_ENDS)), "")
+    return _content(xmp, uri, "original", data, end)
+
+
 def range_notes(xmp: Element) -> tuple[str, ...]:
     """Return a note if the range of GDepth or Dynamic Depth makes no sense, else none."""
     for properties in (_properties(xmp, DEPTH_MAP), _properties(xmp, GDEPTH)):
@@ -84,12 +97,7 @@ def _content(xmp: Element, uri: str, semantic: str, data: bytes, end: int) -> by
     Items lie one after the other behind the photo; if other trailers precede them, they end with the file. The first
     item is the photo itself, whose length a writer need not state.
     """
-    names = ("DataURI", "Semantic", "Length", "Padding")
-    items = [
-        [next(filter(None, (value_in(item, namespace, name) for namespace in ITEMS)), "").strip() for name in names]
-        for item in xmp.iter()
-        if item.tag in ITEM_TAGS
-    ]
+    items = _items(xmp)
     by_uri = [index for index, item in enumerate(items) if uri and item[0] == uri]
     by_meaning = [index for index, item in enumerate(items) if item[1].lower() == semantic]
     if not (by_uri or by_meaning):
@@ -102,7 +110,17 @@ def _content(xmp: Element, uri: str, semantic: str, data: bytes, end: int) -> by
         content = data[start : start + sizes[index][0]] if start >= 0 else b""
         if content.startswith(PICTURE_STARTS):
             return content
-    raise InputError(f"Dynamic Depth names {sizes[index][0]:,} bytes of a map that are not in the file")
+    raise InputError(f"Dynamic Depth names {sizes[index][0]:,} bytes of a picture that are not in the file")
+
+
+def _items(xmp: Element) -> list[list[str]]:
+    """Return URI, meaning, length and padding of each item of a container, "" where they are not stated."""
+    names = ("DataURI", "Semantic", "Length", "Padding")
+    return [
+        [next(filter(None, (value_in(item, namespace, name) for namespace in ITEMS)), "").strip() for name in names]
+        for item in xmp.iter()
+        if item.tag in ITEM_TAGS
+    ]
 
 
 def _range(properties: Properties) -> tuple[float, float] | None:

@@ -26,6 +26,9 @@ SAMSUNG_MAP, SAMSUNG_SIZE = b"DualShot_DepthMap_1", b"DualShot_Extra_Info"
 """Names of the block with a map, and of the block with its size."""
 SIZE = re.compile(rb"(?s)(?:.{4}){8,23}?[\x01-\x09]\x00\xff\xff(.{4})(.{4})")
 """Width and height, after a mark at a multiple of 4 in bytes 32 to 95."""
+SAMSUNG_IN_FOCUS = b"DualShot_1"
+MIN_SAME_LIKENESS, MIN_SHARPNESS_RATIO = 0.9, 1.02
+"""Smallest likeness of the sharp picture to the blurred photo, and how much sharper it is at a small size."""
 HUAWEI_HEADER = re.compile(rb"(?s)edof(?=(.{68}))")
 OTHER_USE = re.compile(rb"http://ns.adobe.com/xap/|urn:iso:std:iso:ts:21496|hdrgm:|GainMap", re.IGNORECASE)
 """Marks of gain maps, mattes and other described pictures in their headers."""
@@ -44,6 +47,25 @@ def samsung_estimate(data: bytes) -> DepthEstimate | None:
     if not depth_map or width * height != len(depth_map):
         raise InputError(f"Samsung's depth map of {width}x{height} pixels holds {len(depth_map):,} bytes")
     return DepthEstimate(1 - _map_of(depth_map, width), "inverse depth")
+
+
+def samsung_in_focus(data: bytes) -> bytes | None:
+    """Return the file of the picture before the phone blurred it, None without."""
+    return _samsung_blocks(data).get(SAMSUNG_IN_FOCUS)
+
+
+def second_in_focus(data: bytes, end: int) -> bytes | None:
+    """Return a JPEG behind a photo, which ends at `end`, that shows the same, sharper and no smaller; None without."""
+    photo = thumbnail_of(data)
+    if photo is None:
+        return None
+    for picture, _ in appended_pictures(data, end):
+        found = None if OTHER_USE.search(picture[:HEADER_BYTES]) else thumbnail_of(picture)
+        if found is None or not has_shape_of(found.size, photo.size) or found.size.width < photo.size.width:
+            continue
+        if _likeness(found, photo) >= MIN_SAME_LIKENESS and found.sharpness > MIN_SHARPNESS_RATIO * photo.sharpness:
+            return picture
+    return None
 
 
 def huawei_estimate(data: bytes, end: int) -> DepthEstimate | None:
@@ -86,6 +108,11 @@ class Thumbnail(NamedTuple):
     colors: NDArray[np.int16]
 
     @property
+    def sharpness(self) -> float:
+        """Mean step from pixel to pixel."""
+        return float(np.abs(np.diff(self.colors, axis=1)).mean())
+
+    @property
     def is_grey(self) -> bool:
         """Return whether nearly all of the pixels are grey."""
         return bool((np.ptp(self.colors, axis=2) > GREY_TOLERANCE).mean() <= 0.01)
@@ -112,13 +139,14 @@ def _is_map(picture: bytes, photo: bytes) -> bool:
     steps = np.maximum(np.abs(np.diff(grey, axis=0))[:, 1:], np.abs(np.diff(grey, axis=1))[1:])
     levels = np.bincount(grey.ravel() // 4)
     is_textured, is_matte = (steps > 3).mean() > 0.35, (levels > grey.size / 200).sum() < 8
-    blocks = (
-        colors.mean(axis=2).reshape(24, 8, 32, 8).mean(axis=(1, 3)).ravel()
-        for colors in (small.colors, photo_small.colors)
-    )
+    return not is_textured and not is_matte and abs(_likeness(small, photo_small)) <= 0.97
+
+
+def _likeness(first: Thumbnail, second: Thumbnail) -> float:
+    """Return the correlation of the brightness of two pictures in squares, 0 if one has none."""
+    blocks = (found.colors.mean(axis=2).reshape(24, 8, 32, 8).mean(axis=(1, 3)).ravel() for found in (first, second))
     with np.errstate(invalid="ignore"):  # a photo of one colour has no copy
-        likeness = np.nan_to_num(np.corrcoef(*blocks)[0, 1])
-    return not is_textured and not is_matte and bool(abs(likeness) <= 0.97)
+        return float(np.nan_to_num(np.corrcoef(*blocks)[0, 1]))
 
 
 def _map_of(content: bytes, width: int) -> FloatImage:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFilter
 from PIL.PngImagePlugin import PngInfo
 
 from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
@@ -18,6 +18,7 @@ from tests.iibr_core import embedded_files as files
 PIXELS, DEPTH = files.disc_scene()
 PHOTO = files.picture(PIXELS)
 SMALL = DEPTH[::2, ::2]
+MAP = files.picture(255 - SMALL, "PNG")
 
 
 def opened(tmp_path: Path, name: str, data: bytes) -> PhotoWithDepth:
@@ -74,6 +75,38 @@ def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path, white_is_near) -> No
     found = opened(tmp_path, "a.jpg", PHOTO + files.picture(SMALL if white_is_near else 255 - SMALL))
     assert_disc_is_nearest(found)
     assert any("counts as near" in note for note in found.disparity.notes)
+
+
+def blurred_and_sharp() -> tuple[bytes, bytes]:
+    blurred = np.asarray(Image.fromarray(PIXELS).filter(ImageFilter.GaussianBlur(3)))
+    return files.picture(blurred), files.picture(PIXELS)
+
+
+WITH_SHARP_PICTURE = {
+    "Dynamic Depth": lambda photo, sharp: files.dynamic_depth_jpeg(photo, MAP, original=sharp),
+    "Pixel": lambda photo, sharp: files.dynamic_depth_jpeg(
+        photo, MAP, before=MAP, original=sharp, shared_container=True
+    ),
+    "Samsung": lambda photo, sharp: files.samsung_jpeg(photo, 255 - SMALL, sharp=sharp),
+    "Huawei": lambda photo, sharp: files.huawei_jpeg(photo, SMALL[:, ::-1], sharp=sharp),
+    "Xiaomi": lambda photo, sharp: (
+        photo + sharp + files.picture((SMALL // 2 + np.indices(SMALL.shape)[0] * 2).astype(np.uint8))
+    ),
+    "GDepth": lambda photo, sharp: files.with_segments(photo, files.gdepth_segments(MAP)) + sharp,
+}
+
+
+@pytest.mark.parametrize("kind", WITH_SHARP_PICTURE)
+def test_the_sharp_picture_of_every_phone_is_shown(tmp_path, kind) -> None:
+    blurred, sharp = blurred_and_sharp()
+    found = opened(tmp_path, "a.jpg", WITH_SHARP_PICTURE[kind](blurred, sharp))
+    assert_disc_is_nearest(found)
+    (tmp_path / "sharp.jpg").write_bytes(sharp)
+    np.testing.assert_allclose(found.photo.pixels, read_photo(tmp_path / "sharp.jpg").pixels, atol=1e-6)
+    assert any("sharp picture" in note for note in found.photo.notes)
+    if kind in ("Huawei", "Xiaomi", "GDepth"):  # the others state which picture is the sharp one
+        found = opened(tmp_path, "a.jpg", WITH_SHARP_PICTURE[kind](sharp, blurred))
+        assert not any("sharp picture" in note for note in found.photo.notes)
 
 
 def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
