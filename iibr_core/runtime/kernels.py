@@ -14,6 +14,7 @@ import os
 import re
 import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -22,11 +23,13 @@ from typing import Any
 import llvmlite.binding
 from platformdirs import user_cache_path
 
-from iibr_core.runtime.compiling import FOLDER_VARIABLE, report_compiling
+from iibr_core.runtime.compiling import FOLDER_VARIABLE, compiled, report_compiling
 
 PACKAGE = Path(__file__).resolve().parents[1]
 SHIPPED = PACKAGE / "_kernels"
 IMPORT = re.compile(rb"(?:from|import) (iibr_core(?:\.\w+)*)")
+KERNELS_OF_A_PHOTO = 105
+"""About the number of compiled kernels that a photo with a map needs."""
 PROCESSOR = "x86-64-v3"
 PROCESSOR_FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse4.2")
 """Level 3 of the x86-64 psABI, in LLVM's names: nearly every such processor since 2015."""
@@ -55,13 +58,21 @@ numba.core.config.reload_config()  # where another library has imported it befor
 
 
 class _CompilingListener(event.Listener):  # type: ignore[misc]  # Numba has no types
-    """Report that a kernel has to be compiled."""
+    """Report that a kernel has to be compiled, and count it. Numba compiles in one thread at a time; calls nest."""
+
+    def __init__(self) -> None:
+        self._begun_s: list[float] = []
 
     def on_start(self, event: Any) -> None:
+        if not compiled.count:
+            compiled.expected = max(KERNELS_OF_A_PHOTO - kernel_count(), 0)
+        self._begun_s.append(time.perf_counter())
         report_compiling()
 
     def on_end(self, event: Any) -> None:
-        pass
+        begun_s = self._begun_s.pop()
+        compiled.count += event.data["dispatcher"].py_func.__module__.startswith("iibr_core.")
+        compiled.seconds += 0.0 if self._begun_s else time.perf_counter() - begun_s
 
 
 event.register("numba:compile", _CompilingListener())
@@ -124,6 +135,11 @@ def kernel_folder() -> Path:
         folder = Path(scratch.name) / "kernels"
         _copy_kernels(folder)
     return folder
+
+
+def kernel_count() -> int:
+    """Return the number of compiled kernels that are kept."""
+    return sum(1 for _ in kernel_folder().rglob("*.nbc"))
 
 
 def _copy_kernels(target: Path) -> None:

@@ -17,6 +17,7 @@ from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.plan import ScenePlan
+from iibr_core.runtime.compiling import working_clock
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import is_stopped
@@ -58,7 +59,7 @@ def results_of(
 
 
 def sketch_of(photo: WantedPhoto) -> SceneReady | None:
-    """Return a large photo at a small size, as generation 0; None if it cannot be read like that."""
+    """Return a photo at a small size, as generation 0; None if that saves no time, or it cannot be read like that."""
     source = photo.source
     with suppress(InputError):
         loaded = None if is_light_field(Path(source.path)) else sketch_photo(source)
@@ -148,7 +149,7 @@ def _count_views(
     generation: int, views: Iterator[ViewUpdate], scene: Scene, wanted: Wanted = lambda: None
 ) -> Iterator[ViewReady]:
     """Yield the views with the progress of making them."""
-    time_left, begun_s = TimeLeft(), time.perf_counter()
+    time_left, begun_s = TimeLeft(working_clock), time.perf_counter()
     for there, view in enumerate(views, 1):
         chosen = wanted()
         total = scene.view_count if chosen is None else len({*chosen, ViewOffset(0.0, 0.0)})

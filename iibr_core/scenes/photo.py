@@ -24,14 +24,17 @@ from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.light_field import ViewMaker, view_maker
 from iibr_core.method.plan import MAX_DEPTH_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
+from iibr_core.runtime.kernels import KERNELS_OF_A_PHOTO, kernel_count
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
 
 SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
+FIRST_SKETCH = ImageSize(height=1000, width=1000)
+"""The same where kernels are to be compiled first, which takes long."""
 SKETCH_WORTH_PIXELS = 1_500_000
-"""Number of pixels from which on a photo gets a sketch: smaller ones are read quickly."""
+"""Number of pixels from which on a photo gets a sketch: smaller ones are read quickly, unless kernels are missing."""
 MAX_SIDE_PX = 16_384
 """Longest side of a photo as it is opened: the limit of most graphics drivers."""
 
@@ -62,16 +65,18 @@ def deepen(source: Source, loaded: LoadedPhoto, refines: bool) -> LoadedPhoto:
 
 
 def sketch_photo(source: Source) -> LoadedPhoto | None:
-    """Return a large photo at a small size with depth that is found quickly, to be shown while it is read.
+    """Return a photo at a small size with depth that is found quickly, to be shown while it is read.
 
     None if it is not worth while.
     """
     path = Path(source.path)
     max_pixels, stored_size = _pixels_to_read(source)
     stamp = stamp_of(path)
-    if source.is_literal or min(math.prod(stored_size), max_pixels) < SKETCH_WORTH_PIXELS:
+    lacks_kernels = kernel_count() < KERNELS_OF_A_PHOTO
+    is_large = min(math.prod(stored_size), max_pixels) >= SKETCH_WORTH_PIXELS
+    if source.is_literal or not (is_large or lacks_kernels):
         return None
-    pixels = read_thumbnail(path, SKETCH).astype(np.float32) / np.float32(255)
+    pixels = read_thumbnail(path, FIRST_SKETCH if lacks_kernels else SKETCH).astype(np.float32) / np.float32(255)
     photo = Photo(pixels, focal_px_from_fov(pixels.shape[1]), path.stem, is_hdr=False)
     found = find_depth(path, photo, replace(source.depth, refine=False), skipped=("pair", "model"))
     return _loaded(found, "", source, _turned_like(stored_size, photo.size), stamp)

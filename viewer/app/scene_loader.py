@@ -110,7 +110,10 @@ class SceneLoader:
         return []
 
     def advance(self, state: AppState) -> None:
-        """Submit the source that the state asks for, and read the next photos."""
+        """Submit the source that the state asks for, and read the next photos.
+
+        The brush is prepared once the first photo's views are there, so that the first stroke does not wait.
+        """
         if state.stopped == state.generation != self._stopped:
             self._worker.cancel()
             self._stopped = state.stopped
@@ -119,6 +122,10 @@ class SceneLoader:
         if is_wanted and state.source is not None and state.stroke is None:
             self._load(state, state.source)
         self._read_ahead(state)
+        is_brush_next = self._scene_view.loaded is not None and (state.progress.is_complete or state.brush.is_on)
+        if is_brush_next and not self._is_brush_asked:
+            self._is_brush_asked = True
+            self._brush_loader.submit(None)
 
     def close(self) -> None:
         """Stop making and reading."""
@@ -160,7 +167,7 @@ class SceneLoader:
         return [do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column))]
 
     def _open(self, ready: SceneReady, state: AppState) -> Action:
-        """Show a scene. The brush is prepared beside the first photo's views, so the first stroke does not wait."""
+        """Show a scene."""
         before, centre, loaded, new_depth = self._scene_view.loaded, self._scene_view.centre, ready.loaded, None
         is_same_photo = before is not None and loaded is not None and loaded.photo is before.photo
         self._scene_view.open(ready)
@@ -173,9 +180,6 @@ class SceneLoader:
             before_px, now_px = centre.disparity if centre is not None else None, ready.centre.disparity
             if before_px is not None and now_px is not None:
                 new_depth = NewDepth(focus_before_and_now(before_px, now_px, state.focused_at))
-        if loaded is not None and not self._is_brush_asked:
-            self._is_brush_asked = True
-            self._brush_loader.submit(None)
         return do(opening.show_scene, ready.generation, ready.scene, new_depth)
 
     def _load(self, state: AppState, source: Source) -> None:

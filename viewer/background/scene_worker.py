@@ -8,7 +8,7 @@ from pathlib import Path
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.photo_folder import first_photo
-from iibr_core.runtime.compiling import watch_compiling
+from iibr_core.runtime.compiling import compiled, watch_compiling
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import Progress, SceneReady, SceneRequest, ViewReady
@@ -61,10 +61,11 @@ class SceneWork:
                 return
             posted, posted_s = doing, now_s
             words = f"{doing}, {round(100 * done / total)} %" if done and total else doing
-            share = done / total if total else views.share
+            share = done / total if total else 0.0 if views.doing else views.share
+            left_s = left_s if done < total else None  # a stage that takes longer than expected
             post(WorkReport(request.generation, replace(views, doing=words, share=share, left_s=left_s)))
 
-        with watch_compiling(lambda words: report(0, 0, words)), watched(report):
+        with watch_compiling(lambda words: report(*compiled.progress, words)), watched(report):
             for result in results_of(request, lambda: self.eye):
                 views = result.progress if isinstance(result, ViewReady) else Progress(total=result.scene.view_count)
                 post(result)

@@ -207,8 +207,9 @@ class SceneView:
     @property
     def report(self) -> DrawReport:
         """The report on the last picture."""
-        renderer = self.renderer
-        return DrawReport(renderer.samples, renderer.samples_converged, 1e3 * renderer.draw_s)
+        renderer, is_sketch = self.renderer, self._scene is not None and self._scene.is_sketch
+        is_draft = is_sketch or not renderer.passes_shown
+        return DrawReport(renderer.samples, renderer.samples_converged, 1e3 * renderer.draw_s, is_draft)
 
     def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
         """Draw the picture with all its samples, however long that takes; return its record as `draw` does."""

@@ -26,7 +26,7 @@ from viewer.ui.sections import (
     stereo_section,
     view_section,
 )
-from viewer.ui.widgets import button, gap, heading, in_row, label, last_part, quiet, scale, tooltip
+from viewer.ui.widgets import button, gap, heading, in_row, label, last_part, lines, quiet, scale, tooltip
 
 TOOLS = (
     (f"{icons.ICON_FA_IMAGE}  Open", "Open a photo…"),
@@ -44,8 +44,11 @@ MORE_TOOLS = (
 )
 START_TOOLS = (MORE_TOOLS[1], TOOLS[5])
 READY = "Ready"
+STATUS_LINES = 2
+"""Height of the words on progress, in lines."""
 HINT = "Drag the picture to look around it, click to focus."
 FLAT_HINT = "All of it is equally far away, so nothing moves."
+CANCEL = "Cancel"
 CANCEL_TIP = "Stop here: the picture stays as it is now, and moves less smoothly."
 _FIXED = (
     imgui.WindowFlags_.no_title_bar
@@ -79,7 +82,7 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
 def _picture(state: AppState, scene: Scene) -> list[Action]:
     gap()
     imgui.text_wrapped(scene.name)
-    depth_section.depth_line(scene)
+    depth_section.depth_line(state, scene)
     actions = _progress(state)
     gap()
     actions += essentials.essentials(state, scene)
@@ -166,30 +169,20 @@ def _recent(state: AppState) -> list[Action]:
 
 
 def _progress(state: AppState) -> list[Action]:
-    """Build a bar, which stays when the work is done so that nothing below it jumps, and a button to stop the work."""
+    """Build a bar, words, and a button to stop the work. All keep their height, so that nothing below them jumps."""
     progress = state.progress
     words = READY if progress.is_complete else progress_text(progress)
-    if not words:
-        return []
     imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * scale()), "")
-    if progress.is_complete or state.stopped == state.generation:
-        quiet(words)
-        return []
-    return [do(opening.stop)] if _words_and_button(words, "Cancel", CANCEL_TIP) else []
-
-
-def _words_and_button(words: str, text: str, tip: str) -> bool:
-    """Build quiet words, and a button at the right end of their first line; the words keep clear of it."""
+    is_pressed = False
     start, padding = imgui.get_cursor_pos_x(), 2 * imgui.get_style().frame_padding.x
-    room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x - padding
-    imgui.set_cursor_pos_x(start + room)
-    is_pressed = imgui.small_button(text)
-    tooltip(tip)
-    imgui.same_line(start)
-    imgui.push_text_wrap_pos(start + room - padding / 2)
-    imgui.text_colored(imgui.get_style().color_(imgui.Col_.text_disabled), words)
-    imgui.pop_text_wrap_pos()
-    return bool(is_pressed)
+    room = imgui.get_content_region_avail().x - imgui.calc_text_size(CANCEL).x - padding
+    if state.is_making_views:
+        imgui.set_cursor_pos_x(start + room)
+        is_pressed = imgui.small_button(CANCEL)
+        tooltip(CANCEL_TIP)
+        imgui.same_line(start)
+    lines(words, STATUS_LINES, room - padding / 2)
+    return [do(opening.stop)] if is_pressed else []
 
 
 def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
@@ -232,7 +225,12 @@ def _scene(state: AppState, scene: Scene) -> list[Action]:
     width, height = scene.own_size or scene.size
     shown = "" if (width, height) == scene.size else f", shown at {scene.width} x {scene.height}"
     size = ("Size", f"{width} x {height}{shown}")
-    for what, value in (*facts, size, ("Colours", scene.color_space.name), ("Depth", scene.depth_source)):
+    for what, value in (
+        *facts,
+        size,
+        ("Colours", scene.color_space.name),
+        ("Depth", depth_section.depth_source(state, scene)),
+    ):
         label(what)
         quiet(value)
     gap()

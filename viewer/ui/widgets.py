@@ -183,6 +183,20 @@ def colored(text: str, color: imgui.ImVec4) -> None:
     imgui.pop_style_color()
 
 
+def lines(text: str, count: int, width: float) -> None:
+    """Build quiet words on exactly that many lines, so that nothing below moves; what is left out is in a tooltip."""
+    room, start = count * imgui.get_text_line_height(), imgui.get_cursor_pos_y()
+    shown = text
+    while shown and imgui.calc_text_size(shown, False, width).y > room:
+        shown = f"{shown.rstrip('…')[:-1].rstrip()}…"
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
+    imgui.text_colored(imgui.get_style().color_(imgui.Col_.text_disabled), shown)
+    imgui.pop_text_wrap_pos()
+    tooltip(text if shown != text else "")
+    imgui.set_cursor_pos_y(start + room)
+    imgui.dummy(imgui.ImVec2(0, 0))
+
+
 def gap(units: float = 2.0) -> None:
     """Leave some room."""
     imgui.dummy(imgui.ImVec2(0, units * scale()))

@@ -61,6 +61,16 @@ def test_a_large_photo_has_a_sketch(tmp_path) -> None:
     assert sketch_photo(replace(source, max_pixels=1_500_000)) is not None
 
 
+def test_a_small_photo_has_a_sketch_of_its_own_size_while_kernels_are_missing(tmp_path, monkeypatch) -> None:
+    write_image(tmp_path / "small.png", np.full((HEIGHT, WIDTH, 3), 99, np.uint8))
+    source = Source(str(tmp_path / "small.png"))
+    assert sketch_photo(source) is None
+    monkeypatch.setattr("iibr_core.scenes.photo.kernel_count", lambda: 0)
+    sketch = sketch_photo(source)
+    assert sketch is not None
+    assert sketch.photo.size == (HEIGHT, WIDTH)
+
+
 def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path) -> None:
     path = write_large_photo(tmp_path)
     path.write_bytes(path.read_bytes()[:20_000])

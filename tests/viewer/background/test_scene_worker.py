@@ -119,11 +119,14 @@ def test_compiling_is_reported_beside_the_count_of_the_views(desk: Desk, monkeyp
 
     monkeypatch.setattr("iibr_core.scenes.opening.results_of", results)
     monkeypatch.setattr("viewer.background.scene_worker.REPORT_INTERVAL_S", 0.0)
+    monkeypatch.setattr(compiling.compiled, "count", 3)
+    monkeypatch.setattr(compiling.compiled, "expected", 12)
     desk.work.eye = ViewOffset(1, 2)
     desk.thread.submit(SceneRequest(1, Source("p")))
     reports = [result.progress for _ in range(3) if isinstance(result := desk.next(with_progress=True), WorkReport)]
     assert [(progress.done, progress.total) for progress in reports] == [(0, 0), (3, 9)]
     assert all(progress.doing.startswith(compiling.COMPILING) for progress in reports)
+    assert all(progress.share == 0.25 for progress in reports), "of the kernels, not of the views"
     assert all(progress.left_s is None for progress in reports), "of two times left, one is wrong"
 
 

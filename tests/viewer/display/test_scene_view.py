@@ -141,6 +141,7 @@ def test_a_still_picture_never_gets_worse_while_views_come(
                 viewer.view.upload_all()
                 viewer.do(do(opening.set_progress, result.generation, result.progress))
             frames += frames_of(viewer.view, viewer.state, frames_a_view)
+            assert viewer.view.report.is_draft != bool(viewer.view.renderer.passes_shown)
             assert frames_a_view == 3 or viewer.view.renderer.passes_shown, "as fine as the window is"
         assert not viewer.state.is_making_views
         frames += frames_of(viewer.view, viewer.state, 40)

@@ -19,6 +19,7 @@ from viewer.model.action import do
 from viewer.model.commands import BY_NAME
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import SECTIONS, Preferences, Section, is_seen_open, with_sections
+from viewer.ui.sections.depth_section import depth_source
 
 WINDOW = ScreenSize(1280, 800)
 MAX_CONTROLS = 17
@@ -65,6 +66,38 @@ def test_there_are_few_controls_at_the_first_start(
     assert len(controls) <= MAX_CONTROLS, controls
     assert {"Undo", "Redo", "Mouse and keys"} <= {words.partition("##")[2] for words in controls}
     assert ("Cancel" in controls) is is_working
+
+
+@pytest.mark.parametrize("font_scale", [1.0, 1.5])
+def test_nothing_below_the_status_line_moves_whatever_it_says(
+    first: OffscreenScene, monkeypatch: pytest.MonkeyPatch, font_scale: float
+) -> None:
+    places: list[float] = []
+
+    def record(kind: str, arguments: tuple[Any, ...]) -> None:
+        if arguments[0] == "Portrait":
+            places.append(imgui.get_item_rect_min().y)
+
+    watch_widgets(monkeypatch, ("button",), places, record)
+    first.state = replace(first.state, preferences=Preferences(font_scale=font_scale))
+    long = Progress(doing="estimating depth with a model of an unusually long name from a folder, 40 %", left_s=7000.0)
+    seen = set[float]()
+    for progress in (Progress(), Progress(doing="making views"), Progress(4, 9), Progress(9, 9, 3.0, share=1.0), long):
+        first.state = replace(first.state, progress=progress)
+        first.screen(WINDOW)
+        seen.add(places[-1])
+    assert len(seen) == 1
+
+
+@pytest.mark.parametrize(
+    ("progress", "words"), [(Progress(0, 9, doing="finding disparity"), "being looked for"), (Progress(), "none")]
+)
+def test_views_without_depth_say_whether_it_is_looked_for(
+    first: OffscreenScene, progress: Progress, words: str
+) -> None:
+    assert first.scene is not None
+    scene = replace(first.scene, depth_source="none", depth_origin=None)
+    assert depth_source(replace(first.state, progress=progress), scene) == words
 
 
 def test_more_brings_headings_and_advanced_two_more(first: OffscreenScene, controls: list[str]) -> None:

@@ -69,6 +69,7 @@ def test_every_section_opens_and_closes(viewer: OffscreenScene, section: Section
         ),
         do(lens.show_tilt_handles, True),
         do(inspection.set_hover, Hover(48.0, 32.0, 1.5)),
+        do(window.set_report, DrawReport(3, 9, 12.0, is_draft=True)),
     ],
     ids=lambda action: type(action).__name__,
 )

@@ -60,11 +60,15 @@ class Hover:
 
 @dataclass(frozen=True)
 class DrawReport:
-    """Report of the last drawing: samples drawn so far, samples of the converged picture, and time in milliseconds."""
+    """Report of the last drawing: samples drawn so far, samples of the converged picture, and time in milliseconds.
+
+    is_draft: whether the picture is coarser than the screen.
+    """
 
     samples: int = 0
     samples_converged: int = 0
     draw_ms: float = 0.0
+    is_draft: bool = False
 
 
 @dataclass(frozen=True)

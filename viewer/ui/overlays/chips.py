@@ -11,10 +11,10 @@ from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS
-from viewer.ui.style import DARK
+from viewer.ui.style import DARK, draw_words
 from viewer.ui.widgets import scale, tooltip
 
-CHIP, BADGE = "free camera", "Depth guessed"
+CHIP, BADGE, DRAFT = "free camera", "Depth guessed", "Draft"
 FULL, SHORT = "Free camera: the photo does not show all of this. C returns", "Free camera. C returns"
 AT_END = "The photo shows nothing beyond this. C returns"
 GUESS_TIP = "Depth is guessed, so near and far may be wrong. Press to get better depth."
@@ -25,11 +25,14 @@ _BARE = CARD_FLAGS | imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_ba
 
 def chips(state: AppState, layout: Layout) -> list[Action]:
     """Build the chip of the free camera at the right, which leaves it, or that of guessed depth at the left, which
-    offers better depth.
+    offers better depth; a picture that is still coarse says so at the other side.
     """
     frame, camera = layout.frame, state.free_camera
     if frame is None or state.scene is None or state.inspection.shows_views or state.shows_before:
         return []
+    if state.report is not None and state.report.is_draft:
+        is_right, gap = camera is None, GAP * scale()
+        draw_words(DRAFT, frame.x + (frame.width - gap if is_right else gap), frame.y + gap, scale(), float(is_right))
     if has_guess_badge(state, layout):
         return [do(depth_models.show_offer, True)] if _chip(BADGE, BADGE, frame, GUESS_TIP) else []
     if camera is None:

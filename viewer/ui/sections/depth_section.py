@@ -67,11 +67,16 @@ OTHER_MODELS = "Depth models…", "All depth models, and model files of your own
 ESTIMATES_TIP = "Estimate the depth of photos without depth with the model that was chosen last, once it is here."
 
 
-def depth_line(scene: Scene) -> None:
+def depth_source(state: AppState, scene: Scene) -> str:
+    """Return the source of depth in a few words."""
+    return "being looked for" if scene.depth_source == "none" and state.is_making_views else scene.depth_source
+
+
+def depth_line(state: AppState, scene: Scene) -> None:
     """Build one line about the source of depth, with a tooltip about failures."""
     origin = scene.depth_origin
-    without = "No depth." if scene.depth_source == "none" else f"Depth: {scene.depth_source}."
-    quiet(origin.line if origin is not None else without)
+    without = depth_source(state, scene)
+    quiet(origin.line if origin is not None else "No depth." if without == "none" else f"Depth: {without}.")
     if origin is not None:
         tooltip("\n".join((*origin.failures, BETTER_DEPTH) if origin.is_poor else origin.failures))
 
