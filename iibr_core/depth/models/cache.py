@@ -1,4 +1,4 @@
-"""Estimates kept on disk by the photo's pixels and the model's files; the least recently used go.
+"""Estimates kept on disk, as by the photo's pixels and the model's files; the least recently used go.
 
 A cache that cannot be read or written counts as empty.
 """
@@ -40,23 +40,34 @@ def key_of(pixels: FloatImage, files: Iterable[Path]) -> str:
 
 def load(key: str) -> DepthEstimate | None:
     """Return the estimate of this key, None if there is none or it is damaged."""
-    path = cache_folder() / f"{key}.npz"
-    try:
-        with np.load(path, allow_pickle=False) as kept:
-            estimate = DepthEstimate(np.array(kept["values"], np.float32), cast(Meaning, str(kept["meaning"])))
-        os.utime(path)
-    except Exception:  # missing, or damaged in one of the many ways that numpy meets
-        return None
-    return estimate
+    kept = load_map(key)
+    return None if kept is None else DepthEstimate(kept[0], cast(Meaning, kept[1]))
 
 
 def store(key: str, estimate: DepthEstimate) -> None:
     """Keep an estimate; the least recently used ones go if all exceed MAX_BYTES."""
+    store_map(key, estimate.values, estimate.meaning)
+
+
+def load_map(key: str) -> tuple[FloatImage, str] | None:
+    """Return the values (H, W) of this key and the text about them, None if there are none or they are damaged."""
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            found = np.array(kept["values"], np.float32), str(kept["meaning"])
+        os.utime(path)
+    except Exception:  # missing, or damaged in one of the many ways that numpy meets
+        return None
+    return found
+
+
+def store_map(key: str, values: FloatImage, meaning: str) -> None:
+    """Keep values (H, W) with a text about them, as `store` does."""
     folder = cache_folder()
     with suppress(OSError, InputError):  # read-only or full: the estimate is made again the next time
         folder.mkdir(parents=True, exist_ok=True)
         with write_file(folder / f"{key}.npz") as temporary:
-            np.savez(temporary, meaning=estimate.meaning, values=estimate.values)
+            np.savez(temporary, meaning=meaning, values=values)
         total = 0
         for entry in sorted(folder.glob("*.npz"), key=lambda entry: entry.stat().st_mtime_ns, reverse=True):
             total += entry.stat().st_size
