@@ -7,7 +7,8 @@ resampled (from 224 pixels); phone (a third of the size, 8 bits, soft); network-
 network (estimated by --depth-model), guess, plane: at the best scale and shift. PSNR is the mean over the views at the
 corners and sides of the light field: whole views; what the photo sees; within 3 px of holes; in holes, which are those
 of the exact map. Flying pixels stand out from their 5 x 5 median near holes, where the truth's do not, in 10,000.
-Seconds of processor time, of all threads, are those of 9 x 9 views, set-up included.
+Seconds of processor time, of all threads, are those of 9 x 9 views, set-up included. --boundaries gives the boundary F1
+of the maps, before and after they are refined.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from benchmarks.boundaries import boundary_table, judge_boundaries
 from benchmarks.report import markdown
 from benchmarks.scenes import MAX_PIXELS, Scene, data_scenes, drawn_scene, with_map
 from benchmarks.ways import Way, chosen_ways, land
@@ -66,6 +68,10 @@ def main(words: Sequence[str] | None = None) -> None:
     """Run the program."""
     options = command_line().parse_args(words)
     scenes = list(chosen_scenes(options))
+    if options.boundaries:
+        print(f"{len(scenes)} scenes: {', '.join(scene.name for scene in scenes)}.\n")
+        print(boundary_table(judge_boundaries(scenes, options.maps.split(","), options.depth_model)))
+        return
     results = list(compare(scenes, chosen_ways(options.ways), options.maps.split(","), options.depth_model))
     print(f"{len(scenes)} scenes: {', '.join(scene.name for scene in scenes)}.\n")
     if options.against:
@@ -89,6 +95,7 @@ def command_line() -> argparse.ArgumentParser:
     parser.add_argument("--depth-model", type=Path, help="ONNX file of the network of `--maps network`")
     parser.add_argument("--by", choices=["mean", "scene"], default="mean", help="rows of the table")
     parser.add_argument("--against", metavar="WAY", help="show the changes from this way instead")
+    parser.add_argument("--boundaries", action="store_true", help="boundary F1 of the maps instead, given and refined")
     parser.add_argument("--plot", type=Path, metavar="SVG", help="also draw PSNR over time")
     return parser
 

@@ -5,7 +5,7 @@ Depth without a scale gets the parallax that viewing plans for; depth strength a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -24,11 +24,13 @@ class DepthEstimate:
     """Depth of a photo.
 
     values: (H, W) float32, NaN unknown. meaning: "inverse depth" up to an unknown positive scale and an offset, larger
-    is closer; "metres" from the camera, positive; "disparity" in px per view step of a picture this large.
+    is closer; "metres" from the camera, positive; "disparity" in px per view step of a picture this large. focal_ratio:
+    focal length in widths of the picture, None if it was not estimated.
     """
 
     values: FloatImage
     meaning: Meaning
+    focal_ratio: float | None = None
 
     @property
     def is_metric(self) -> bool:
@@ -39,8 +41,8 @@ class DepthEstimate:
     def inverted(self) -> DepthEstimate:
         """Return the estimate with near and far swapped: distances become inverse distances."""
         if self.is_metric:
-            return DepthEstimate(self.values, "inverse depth")
-        return DepthEstimate(-self.values, self.meaning)
+            return replace(self, meaning="inverse depth")
+        return replace(self, values=-self.values)
 
 
 def disparity_from(estimate: DepthEstimate, grid: GridShape) -> tuple[FloatImage, tuple[float, float] | None]:

@@ -26,7 +26,7 @@ from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.sidecar import find_sidecars, unused_map_notes
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.open_picture import open_picture
-from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
 from iibr_core.formats.maps.reader import MapFile, read_depth_channel, read_map_picture
@@ -211,7 +211,8 @@ class _Search:
         depth = orient_map(
             model.title, values, self.photo, self.choice, estimate.is_metric, is_stated=estimate.is_metric
         )
-        return self.finish(replace(origin, near=depth.near), depth.estimate, depth.notes)
+        oriented = replace(depth.estimate, focal_ratio=estimate.focal_ratio)
+        return self.finish(replace(origin, near=depth.near), oriented, depth.notes)
 
     def guess(self) -> PhotoWithDepth:
         raise_if_stopped()
@@ -222,7 +223,7 @@ class _Search:
 
     def finish(self, origin: DepthOrigin, estimate: DepthEstimate, notes: tuple[str, ...] = ()) -> PhotoWithDepth:
         """Return the photo with the disparity of an estimate at its size, holes filled, edges drawn to the photo's."""
-        photo, name = self.photo, origin.words if origin.kind == "file" else "its depth"
+        photo, name = _with_focal(self.photo, estimate), origin.words if origin.kind == "file" else "its depth"
         values, metres = disparity_from(estimate.inverted if self.choice.inverts else estimate, self.grid or USUAL_GRID)
         notes = filling_note(name, values) + notes
         if metres is not None:
@@ -240,6 +241,13 @@ class _Search:
             values = refine(photo.pixels, values, unknown, is_enlarged=is_enlarged)
         disparity = Disparity(values, origin.words, notes, metres, unknown, is_enlarged)
         return PhotoWithDepth(photo, disparity, origin)
+
+
+def _with_focal(photo: Photo, estimate: DepthEstimate) -> Photo:
+    """Return the photo with the focal length that was estimated with its depth, unless its file states one."""
+    width, ratio = photo.size.width, estimate.focal_ratio
+    is_known = photo.focal_px != focal_px_from_fov(width)
+    return photo if ratio is None or is_known else replace(photo, focal_px=ratio * width)
 
 
 def _at_size(small: FloatImage, width: int, photo: Photo) -> FloatImage:

@@ -169,7 +169,7 @@ class SceneLoader:
     def _open(self, ready: SceneReady, state: AppState) -> Action:
         """Show a scene."""
         before, centre, loaded, new_depth = self._scene_view.loaded, self._scene_view.centre, ready.loaded, None
-        is_same_photo = before is not None and loaded is not None and loaded.photo is before.photo
+        is_same_photo = before is not None and loaded is not None and loaded.photo.pixels is before.photo.pixels
         self._scene_view.open(ready)
         self._inspection_view.open()
         self._set_title(f"{ready.scene.name} - iibr")

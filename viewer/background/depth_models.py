@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from iibr_core.depth.models.cache import seconds_of
 from iibr_core.depth.models.catalog import fetch, known_model, list_own_models, model_here
 from iibr_core.depth.models.download import NoConnectionError
 from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
@@ -61,7 +62,8 @@ class DepthFinder:
     def newest(self, loaded: LoadedPhoto | None) -> LoadedPhoto | None:
         """Return the loaded photo, with the depth that was estimated for it if the screen does not show that yet."""
         found = self._found
-        if loaded is None or found is None or found.photo is not loaded.photo or found.found is loaded.found:
+        is_other = loaded is None or found is None or found.photo.pixels is not loaded.photo.pixels
+        if loaded is None or found is None or is_other or found.found is loaded.found:
             self._found = None
             return loaded
         return found
@@ -71,7 +73,7 @@ class DepthFinder:
         if model is None or loaded is None or state.scene is None:
             self._newest.cancel()
             self._asked = None
-        elif asked is None or model != asked.model or loaded.photo is not asked.loaded.photo:
+        elif asked is None or model != asked.model or loaded.photo.pixels is not asked.loaded.photo.pixels:
             self._asked = EstimateRequest(state.scene.source, loaded, model, state.depth.refine)
             self._newest.submit(self._asked)
 
@@ -133,7 +135,7 @@ def list_models() -> tuple[ModelOffer, ...]:
 def _offer_of_own(name: str, file: Path) -> ModelOffer:
     megabytes, package = round(file.stat().st_size / MEGABYTE), missing_package("onnx")
     lacks = f"needs the package {package}" if package else ""
-    words = f"{megabytes:,} MB, your own: {file}"
+    words = f"{megabytes:,} MB{_time_text(name)}, your own: {file}"
     return ModelOffer(name, name, megabytes, "your own", "", words, True, lacks, runs_as_installed=True)
 
 
@@ -147,12 +149,18 @@ def _offer_of(model: KnownModel) -> ModelOffer:
         model.megabytes,
         model.licence,
         host=urlsplit(constants.ENDPOINT).netloc,
-        words=" ".join(filter(None, (f"{model.figures}.", model.advice, model.needs))),
+        words=" ".join(filter(None, (f"{model.figures}{_time_text(model.name)}.", model.advice, model.needs))),
         is_here=model_here(model) is not None,
         lacks=f"needs the package {package}" if package else "",
         is_recommended=model.is_recommended,
         runs_as_installed=model.runs_as_installed,
     )
+
+
+def _time_text(model: str) -> str:
+    """Return how long the model took on this machine, for the end of its figures; "" if it never ran."""
+    seconds = seconds_of(model)
+    return "" if seconds is None else f", {seconds:.1f} s here"
 
 
 def focus_before_and_now(

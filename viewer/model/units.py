@@ -47,9 +47,15 @@ def distance_limits(scene: Scene) -> tuple[float, float] | None:
 def f_number(scene: Scene, aperture_diameter: float) -> float | None:
     """Return the f-number of an aperture in view steps, None if unknown and for a pinhole."""
     still = _disparity_as_given(scene, 0.0)
-    if still is None or scene.plan is None or scene.focal_px is None or still <= 0 or aperture_diameter <= 0:
+    if still is None or scene.plan is None or scene.focal_px is None or aperture_diameter <= 0:
         return None
-    view_step_m = abs(scene.plan.disparity_scale) * still * ASSUMED_DISTANCE_M / scene.focal_px
+    step_px = abs(scene.plan.disparity_scale) / scene.focal_px
+    if scene.inverse_metres is not None and scene.inverse_metres[0]:  # disparity counts inverse metres
+        view_step_m = step_px / abs(scene.inverse_metres[0])
+    elif still > 0:
+        view_step_m = step_px * still * ASSUMED_DISTANCE_M
+    else:
+        return None
     focal_m = scene.focal_px / scene.width * FULL_FRAME_WIDTH_M
     return focal_m / (aperture_diameter * view_step_m)
 

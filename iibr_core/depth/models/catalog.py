@@ -5,6 +5,7 @@ from __future__ import annotations
 import filecmp
 import os
 import shutil
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.models import cache, onnx, torch_models
 from iibr_core.depth.models.download import download, local_folder
 from iibr_core.depth.models.known import KNOWN_MODELS, USUAL_MODEL, KnownModel, Runner, missing_package
-from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR, read_object
+from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR, USUAL_PREPARATION, Preparation, read_object
 from iibr_core.formats.files import entries_of
 from iibr_core.formats.outputs import write_folder
 from iibr_core.remedies import FixableError, Remedy
@@ -30,6 +31,7 @@ class LocalModel:
     """A model on this machine. weights: its file and the files beside it that hold its numbers, or those in a folder.
 
     name: finds it, a path for files and folders. is_meaning_known: whether the meaning of its estimates is certain.
+    preparation: of the photo, where no file beside the weights states it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class LocalModel:
     runner: Runner
     weights: tuple[Path, ...]
     is_meaning_known: bool = True
+    preparation: Preparation = USUAL_PREPARATION
 
     def estimate(self, photo: Photo) -> DepthEstimate:
         """Return the depth of a photo at a size of the model's choice, from the cache if it is there.
@@ -47,17 +50,18 @@ class LocalModel:
         photo = photo_in_srgb(photo)
         report_progress(0, 0, f"looking for an earlier estimate by {self.title}")
         key = cache.key_of(photo.pixels, (self.folder / CONFIG, self.folder / PREPROCESSOR, *self.weights))
-        found = cache.load(key)
+        found, began = cache.load(key), time.perf_counter()
         if found is None:
             match self.runner:
                 case "onnx":
-                    found = onnx.estimate_onnx(self.weights[0], self.folder, self.title, photo)
+                    found = onnx.estimate_onnx(self.weights[0], self.folder, self.title, photo, self.preparation)
                 case "transformers":
                     found = torch_models.estimate_transformers(self.folder, self.title, photo)
                 case "unidepth":
                     found = torch_models.estimate_unidepth(self.folder, self.title, photo)
             _require_use(found, self.title)
             cache.store(key, found)
+            cache.note_seconds(self.name, time.perf_counter() - began)
         return found
 
 
@@ -97,7 +101,8 @@ def model_here(model: KnownModel) -> LocalModel | None:
     folder = local_folder(model)
     if not all((folder / name).is_file() for name in model.files):
         return None
-    return LocalModel(model.name, model.title, folder, model.runner, (folder / model.files[-1],))
+    weights = (folder / model.files[-1],)
+    return LocalModel(model.name, model.title, folder, model.runner, weights, preparation=model.preparation)
 
 
 def fetch(model: KnownModel) -> LocalModel:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR
+from iibr_core.depth.models.preparation import CONFIG, PLAIN_COLORS, PREPROCESSOR, USUAL_PREPARATION, Preparation
 from iibr_core.runtime.extras import install_command, is_installed
 
 Runner = Literal["onnx", "transformers", "unidepth"]
@@ -23,7 +23,8 @@ class KnownModel:
     """A published model.
 
     repository: on the Hugging Face hub; commit: of it, in full, the only one that is downloaded. megabytes: of the
-    weights, about. good_for: in a few words.
+    weights, about. good_for: in a few words. weights: file in the repository, "" for the usual one. has_settings:
+    whether JSON files about it lie there, too; else preparation counts. is_metric: whether it gives metres.
     """
 
     name: str
@@ -34,11 +35,16 @@ class KnownModel:
     licence: str
     good_for: str
     runner: Runner = "transformers"
+    weights: str = ""
+    has_settings: bool = True
+    preparation: Preparation = USUAL_PREPARATION
+    is_metric: bool = False
 
     @property
     def files(self) -> tuple[str, ...]:
         """Names of its files, the weights last."""
-        return CONFIG, PREPROCESSOR, "onnx/model.onnx" if self.runner == "onnx" else "model.safetensors"
+        weights = self.weights or ("onnx/model.onnx" if self.runner == "onnx" else "model.safetensors")
+        return (CONFIG, PREPROCESSOR, weights) if self.has_settings else (weights,)
 
     @property
     def runs_as_installed(self) -> bool:
@@ -52,8 +58,8 @@ class KnownModel:
 
     @property
     def figures(self) -> str:
-        """Size and licence, for lists."""
-        return f"{self.megabytes:,} MB, {self.licence}"
+        """Size, licence and meaning, for lists."""
+        return f"{self.megabytes:,} MB, {self.licence}, {'metres' if self.is_metric else 'relative depth'}"
 
     @property
     def advice(self) -> str:
@@ -81,8 +87,45 @@ KNOWN_MODELS = (
         "64fe43eba7f8a384b02fe3fadaa26cbba35548d8",
         99,
         "Apache-2.0",
-        "any photo; the fastest",
+        "any photo",
         "onnx",
+    ),
+    KnownModel(
+        "depth-anything-v2-small-int8",
+        "Depth Anything V2 Small, 8 bits",
+        "onnx-community/depth-anything-v2-small",
+        "64fe43eba7f8a384b02fe3fadaa26cbba35548d8",
+        27,
+        "Apache-2.0",
+        "any photo where the line is slow; coarser numbers",
+        "onnx",
+        "onnx/model_int8.onnx",
+    ),
+    KnownModel(
+        "moge-2-small",
+        "MoGe-2 Small",
+        "Ruicheng/moge-2-vits-normal-onnx",
+        "e50ffda41565591092adea54c6ac83d6212e1e23",
+        141,
+        "MIT",
+        "distances in metres and the focal length, of any photo; knows the sky",
+        "onnx",
+        "model.onnx",
+        has_settings=False,
+        is_metric=True,
+    ),
+    KnownModel(
+        "midas-small",
+        "MiDaS 2.1 Small",
+        "julienkay/sentis-MiDaS",
+        "3186add7635419f19189ce96a7c9b6280b9a1aed",
+        66,
+        "MIT",
+        "slow machines and comparison with older work; 256 pixels",
+        "onnx",
+        "onnx/midas_v21_small_256.onnx",
+        has_settings=False,
+        preparation=PLAIN_COLORS,
     ),
     KnownModel(
         "depth-anything-v2-base",
@@ -112,6 +155,7 @@ KNOWN_MODELS = (
         99,
         "Apache-2.0",
         "rooms, where distances in metres matter",
+        is_metric=True,
     ),
     KnownModel(
         "depth-anything-v2-metric-outdoor",
@@ -121,6 +165,7 @@ KNOWN_MODELS = (
         99,
         "Apache-2.0",
         "streets and landscapes, where distances in metres matter",
+        is_metric=True,
     ),
     KnownModel(
         "depth-pro",
@@ -130,6 +175,7 @@ KNOWN_MODELS = (
         1904,
         "Apple's model licence (for research)",
         "sharp outlines such as hair, and distances in metres; slow",
+        is_metric=True,
     ),
     KnownModel(
         "zoedepth",
@@ -139,15 +185,7 @@ KNOWN_MODELS = (
         1380,
         "MIT",
         "distances in metres, indoors and on streets, under a free licence",
-    ),
-    KnownModel(
-        "midas-dpt-large",
-        "MiDaS 3 (DPT large)",
-        "Intel/dpt-large",
-        "bc15f29aa3a80d532f2ed650b5e16ac48d8958f9",
-        1370,
-        "Apache-2.0",
-        "comparing with older work",
+        is_metric=True,
     ),
 )
 """Sizes and licences as published; the repository has the last word."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,8 @@ class Preparation:
 
 USUAL_PREPARATION = Preparation(ImageSize(518, 518), True, 14, (0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
 """Depth Anything V2's preparation."""
+PLAIN_COLORS = replace(USUAL_PREPARATION, mean=(0.0, 0.0, 0.0), std=(1.0, 1.0, 1.0))
+"""Preparation of networks that normalise colours themselves: they take RGB from 0 to 1."""
 
 
 def network_input(pixels: FloatImage, preparation: Preparation, size: ImageSize) -> FloatImage:

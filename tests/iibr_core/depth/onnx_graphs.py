@@ -14,10 +14,10 @@ IR_VERSION, OPSET = 10, 17
 
 
 def save_graph(file: Path, nodes: list[Any], constants: dict[str, Any], takes: Any, *gives: str) -> Path:
-    """Save a graph from nodes and arrays by name. takes: the value info of its input; gives: names of its outputs."""
+    """Save a graph from nodes and arrays by name. takes: value info of its input, or several; gives: output names."""
     outputs = [helper.make_tensor_value_info(name, TensorProto.FLOAT, None) for name in gives]
     arrays = [numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()]
-    graph = helper.make_graph(nodes, "graph", [takes], outputs, arrays)
+    graph = helper.make_graph(nodes, "graph", takes if isinstance(takes, list) else [takes], outputs, arrays)
     opset = helper.make_opsetid("", OPSET)
     onnx.save(helper.make_model(graph, opset_imports=[opset], ir_version=IR_VERSION), str(file))
     return file
@@ -33,6 +33,32 @@ def weighing(file: Path, weights: tuple[float, float, float], fixed: ImageSize |
     constants = {"weights": np.array(weights, np.float32).reshape(1, 3, 1, 1), "axis": [1]}
     takes = helper.make_tensor_value_info("pixel_values", TensorProto.FLOAT, ["batch", 3, *sides])
     return save_graph(file, nodes, constants, takes, "predicted_depth")
+
+
+def of_points(file: Path, points: np.ndarray, mask: np.ndarray, tokens: int) -> Path:
+    """A graph with MoGe's inputs and outputs: these points (H, W, 3) and this mask, whatever the picture is.
+
+    The scale is the picture's largest number, times the number of tokens that it is given, over `tokens`.
+    """
+    nodes = [
+        helper.make_node("ReduceMax", ["image"], ["brightest"], keepdims=0),
+        helper.make_node("Cast", ["num_tokens"], ["count"], to=TensorProto.FLOAT),
+        helper.make_node("Div", ["count", "right"], ["ratio"]),
+        helper.make_node("Mul", ["brightest", "ratio"], ["factor"]),
+        helper.make_node("Reshape", ["factor", "one"], ["scale"]),
+        helper.make_node("Identity", ["all_points"], ["points"]),
+        helper.make_node("Identity", ["all_points"], ["normal"]),
+        helper.make_node("Identity", ["all_mask"], ["mask"]),
+    ]
+    constants = {
+        "right": np.float32(tokens),
+        "one": np.array([1], np.int64),
+        "all_points": points[None].astype(np.float32),
+        "all_mask": mask[None].astype(np.float32),
+    }
+    image = helper.make_tensor_value_info("image", TensorProto.FLOAT, ["batch", 3, *mask.shape])
+    count = helper.make_tensor_value_info("num_tokens", TensorProto.INT64, [])
+    return save_graph(file, nodes, constants, [image, count], "points", "normal", "mask", "scale")
 
 
 def published(folder: Path) -> dict[str, bytes]:

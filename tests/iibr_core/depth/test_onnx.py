@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,16 @@ from onnx.external_data_helper import set_external_data
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.models import cache
-from iibr_core.depth.models.catalog import LocalModel, model_to_use
+from iibr_core.depth.models.catalog import LocalModel, known_model, model_here, model_to_use
+from iibr_core.depth.models.download import local_folder
 from iibr_core.depth.models.onnx import depth_output
 from iibr_core.depth.models.preparation import USUAL_PREPARATION, read_preparation
-from iibr_core.depth.search import open_with_depth
+from iibr_core.depth.search import find_depth, open_with_depth
+from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
-from tests.iibr_core.depth.onnx_graphs import of_channels, save_graph, weighing
+from tests.iibr_core.depth.onnx_graphs import of_channels, of_points, save_graph, weighing
 
 MEAN, DEVIATION = (np.array(values, np.float32) for values in (USUAL_PREPARATION.mean, USUAL_PREPARATION.std))
 MAP = np.arange(56 * 84, dtype=np.float32)
@@ -173,7 +176,7 @@ def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_
     file, photo = with_external_weights(tmp_path / "model.onnx"), photo_of(60, 90)
     first = values_of(file, photo)
     assert values_of(file, photo).tolist() == first.tolist()
-    assert len(list((tmp_path / "cache").iterdir())) == 1
+    assert len(list((tmp_path / "cache").glob("*.npz"))) == 1
     before = file.read_bytes()
     with_external_weights(file, (0.0, 1.0, 0.0))
     assert file.read_bytes() == before, "only the file of numbers changed"
@@ -181,7 +184,7 @@ def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_
     values_of(file, photo_of(61, 90))
     (tmp_path / "preprocessor_config.json").write_text('{"size": 28}')
     assert values_of(file, photo).shape != first.shape
-    assert len(list((tmp_path / "cache").iterdir())) == 4
+    assert len(list((tmp_path / "cache").glob("*.npz"))) == 4
     (tmp_path / "model.onnx_data").unlink()
     with pytest.raises(InputError, match=r"its weights are in model\.onnx_data, which does not lie beside it"):
         values_of(file, photo)
@@ -225,3 +228,63 @@ def test_a_running_estimate_can_be_stopped(tmp_path) -> None:
     answers = iter([False])  # at the second question, the graph runs
     with pytest.raises(Cancelled), stoppable(lambda: next(answers, True)):
         values_of(file, photo_of(60, 90))
+
+
+def test_a_map_of_points_gives_metres_the_sky_and_the_focal_length(tmp_path) -> None:
+    """As of MoGe-2: points are known but for a shift along z; plain colours and a number of tokens go in."""
+    height, width, focal_ratio, shift, brightest = 56, 84, 1.3, 0.7, 0.8
+    rows, columns = np.indices((height, width), np.float32)
+    metres = 2 + columns / width + 3 * (rows > 30)
+    seen = np.stack([columns + 0.5 - width / 2, rows + 0.5 - height / 2], axis=2) / (focal_ratio * width)
+    points = np.concatenate([seen * metres[..., None], metres[..., None] - shift], axis=2) / brightest
+    points[..., 2] = metres / brightest - shift
+    mask = np.where(rows < 10, 0.1, 0.9)
+    points[rows < 10] = 9e5
+    file = of_points(tmp_path / "moge.onnx", points, mask, tokens=(height // 14) * (width // 14))
+    pixels = np.full((height, width, 3), 0.3, np.float32)
+    pixels[20, 20] = brightest
+    photo = Photo(pixels, focal_px_from_fov(width), "photo")
+    found = model_of(file).estimate(photo)
+    assert found.meaning == "metres"
+    np.testing.assert_allclose(found.values[mask > 0.5], metres[mask > 0.5], rtol=1e-3)
+    assert (found.values[mask < 0.5] > 1000).all(), "the sky is far"
+    assert found.focal_ratio == pytest.approx(focal_ratio, rel=1e-3)
+    assert model_of(file).estimate(photo).focal_ratio == found.focal_ratio, "from the cache, too"
+    write_image(tmp_path / "photo.png", (pixels * 255).astype(np.uint8))
+    with_depth = open_with_depth(tmp_path / "photo.png", DepthChoice("model", model=str(file)))
+    assert with_depth.photo.focal_px == pytest.approx(focal_ratio * width, rel=1e-3)
+    stated = find_depth(tmp_path / "photo.png", replace(photo, focal_px=77.0), DepthChoice("model", model=str(file)))
+    assert stated.photo.focal_px == 77.0, "a file that states its focal length is believed"
+
+
+def test_the_focal_length_of_other_metric_models_is_used(tmp_path) -> None:
+    """As of Depth Pro, in pixels of its input."""
+    nodes = [
+        helper.make_node("ReduceMean", ["x"], ["depth"], axes=[1], keepdims=0),
+        helper.make_node("Identity", ["length"], ["focallength_px"]),
+    ]
+    constants = {"length": np.array([84.0], np.float32)}
+    takes = helper.make_tensor_value_info("x", TensorProto.FLOAT, [1, 3, 56, 56])
+    file = save_graph(tmp_path / "model.onnx", nodes, constants, takes, "depth", "focallength_px")
+    assert model_of(file).estimate(photo_of(112, 112)).focal_ratio == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("name", ["depth-anything-v2-small-int8", "moge-2-small", "midas-small"])
+def test_published_models_without_settings_take_colours_as_they_were_trained(tmp_path, monkeypatch, name) -> None:
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path))
+    model = known_model(name)
+    assert model.licence in ("MIT", "Apache-2.0")
+    assert model.megabytes < 150
+    folder = local_folder(model)
+    for file in model.files[:-1]:
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text("{}")
+    (folder / model.files[-1]).parent.mkdir(parents=True, exist_ok=True)
+    weighing(folder / model.files[-1], (1, 0, 0), ImageSize(256, 256))
+    here = model_here(model)
+    assert here is not None
+    photo = photo_of(256, 256)
+    usual = (photo.pixels[..., 0] - MEAN[0]) / DEVIATION[0]
+    wanted = photo.pixels[..., 0] if name == "midas-small" else usual  # this file has not MoGe's inputs
+    np.testing.assert_allclose(here.estimate(photo).values, wanted, atol=1e-4)
+    assert cache.seconds_of(name) is not None

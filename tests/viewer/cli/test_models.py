@@ -39,7 +39,7 @@ def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
     about, error = done.stderr.splitlines()
     assert done.returncode == 2
     assert "99 MB, Apache-2.0" in about
-    assert error.startswith("iibr: onnx-community/depth-anything-v2-small cannot be downloaded")
+    assert error.startswith("iibr: Depth Anything V2 Small cannot be downloaded: ")
     assert "network" in error
     assert not list(tmp_path.rglob("*.safetensors"))
 

@@ -68,3 +68,9 @@ class DepthModels:
     def recommended(self) -> ModelOffer | None:
         """The recommended model; None before the models are listed."""
         return next((offer for offer in self.known if offer.is_recommended), None)
+
+    @property
+    def smallest(self) -> ModelOffer | None:
+        """The smallest model that runs as installed and is not here yet."""
+        offers = (offer for offer in self.known if offer.runs_as_installed and not (offer.is_here or offer.lacks))
+        return min(offers, key=lambda offer: offer.megabytes, default=None)

@@ -48,7 +48,7 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     if state.notices:
         actions += _notice(state.notices[-1], state)
     if offer is not None:
-        actions += _offer(offer)
+        actions += _offer(offer, state.models.smallest)
     imgui.end()
     return actions
 
@@ -97,8 +97,8 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     return actions
 
 
-def _offer(model: ModelOffer) -> list[Action]:
-    """Draw the offer of better depth in place of a guess."""
+def _offer(model: ModelOffer, smallest: ModelOffer | None) -> list[Action]:
+    """Draw the offer of better depth in place of a guess. smallest: model for a slow line."""
     words, verb = f"Depth is guessed. {model.title} is here.", "Estimate depth"
     if model.lacks:
         words = f"Depth is guessed. {model.title}: {model.lacks}"
@@ -111,6 +111,8 @@ def _offer(model: ModelOffer) -> list[Action]:
     imgui.align_text_to_frame_padding()
     quiet(words)
     offers = [] if model.lacks else [(verb, do(depth_models.get_depth))]
+    if smallest is not None and not model.is_here and smallest.megabytes < model.megabytes:
+        offers.append((f"Smaller ({smallest.megabytes} MB)", do(depth_models.use_model, smallest.name)))
     actions += button_rows([*offers, ("Don't offer again", do(depth_models.offer_no_more))])
     imgui.end_group()
     return actions

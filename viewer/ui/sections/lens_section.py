@@ -24,6 +24,7 @@ DISTANCE_TIP = "Distance that is sharp. 1 is the plane that stays still while th
 RANGE_TIP = "Depth before and behind the focus that is also sharp."
 APERTURE_TIP = "Opening of the lens. A wider opening blurs everything out of focus more."
 F_NUMBER_TIP = " The f-number is that of a full-frame lens that is focused at {:.0f} m."
+METRIC_TIP = " The f-number is that of a full-frame lens with the photo's angle of view, by the distances in metres."
 EQUIVALENT_TIP = " ≈ f/2 means: an 85 mm full-frame lens, focused at 2 m, blurs the background as much at f/2."
 ALL_SHARP = "all sharp"
 """F-number of a pinhole."""
@@ -96,7 +97,8 @@ def aperture_slider(state: AppState, scene: Scene) -> list[Action]:
     """Build the aperture slider, in stops like the ring of a lens: a pinhole at the left, wide open at the right."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
     words, is_exact = units.f_number_text(scene, diameter), units.f_number(scene, widest) is not None
-    tip = APERTURE_TIP + (F_NUMBER_TIP.format(units.ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
+    exact_tip = METRIC_TIP if scene.inverse_metres is not None else F_NUMBER_TIP.format(units.ASSUMED_DISTANCE_M)
+    tip = APERTURE_TIP + (exact_tip if is_exact else EQUIVALENT_TIP)
     if state.preferences.units == "light field":
         form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"
         return edit(lens.set_aperture, diameter, slider("Aperture", diameter, (0.0, widest), form, tip))
