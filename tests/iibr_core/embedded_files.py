@@ -143,18 +143,19 @@ def samsung_jpeg(photo: bytes, depth: np.ndarray, audio: bool = False, sharp: by
 HEIC_DEPTH = b"urn:mpeg:hevc:2015:auxid:2"
 
 
-def heic(pixels, depth=None, auxiliary=HEIC_DEPTH):
+def heic(pixels, depth=None, auxiliary=HEIC_DEPTH, orientation=1):
     """A HEIC photo, with an auxiliary picture if asked: the second picture of a file of two, made one by hand.
 
-    auxiliary: its type, depth or another one.
+    auxiliary: its type, depth or another one. orientation: Exif's, of the stored pixels.
     """
     import pillow_heif
 
     file = pillow_heif.from_bytes("RGB", (pixels.shape[1], pixels.shape[0]), pixels.tobytes())
     if depth is not None:
         file.add_frombytes("L", (depth.shape[1], depth.shape[0]), depth.tobytes())
-    whole = io.BytesIO()
-    file.save(whole, format="HEIF", quality=-1)
+    whole, exif = io.BytesIO(), Image.Exif()
+    exif[0x0112] = orientation
+    file.save(whole, format="HEIF", quality=-1, **({"exif": exif.tobytes()} if orientation != 1 else {}))
     return whole.getvalue() if depth is None else _with_second_as(bytearray(whole.getvalue()), auxiliary)
 
 

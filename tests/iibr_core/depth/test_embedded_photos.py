@@ -138,8 +138,10 @@ def test_an_apple_portrait_in_a_heic(tmp_path) -> None:
     assert found.origin.words == "the photo itself (Apple portrait)"
 
 
-def test_a_samsung_heic(tmp_path) -> None:
-    data = files.samsung_jpeg(files.heic(PIXELS), 255 - SMALL)
+@pytest.mark.parametrize(("orientation", "quarters"), [(1, 0), (3, 2), (6, 1), (8, -1)])
+def test_the_map_of_a_samsung_heic_is_turned_with_its_photo(tmp_path, orientation, quarters) -> None:
+    photo, stored = (np.ascontiguousarray(np.rot90(upright, quarters)) for upright in (PIXELS, 255 - SMALL))
+    data = files.samsung_jpeg(files.heic(photo, orientation=orientation), stored)
     assert_disc_is_nearest(opened(tmp_path, "a.heic", data))
 
 

@@ -180,6 +180,17 @@ def test_an_export_asked_for_before_its_views_are_there_outlives_its_photo(
     assert bytes_of(early) == bytes_of(late)
 
 
+def test_an_export_asked_for_right_after_an_edit_of_the_depth_shows_it(viewer: Driver, tmp_path: Path) -> None:
+    app = viewer.app
+    before, early, late = (tmp_path / f"{when}.gif" for when in ("before", "early", "late"))
+    inverted = do(depth.set_tone, DepthEdits(is_inverted=True), is_finished=True)
+    for out, actions in ((before, ()), (early, (inverted,)), (late, ())):
+        app.do(*actions, export("gif", out))
+        viewer.until(lambda app, out=out: f"Exported {out}" in texts(app))  # type: ignore[misc]
+        viewer.until_idle()
+    assert bytes_of(before) != bytes_of(early) == bytes_of(late)
+
+
 def test_the_list_of_exports_cancels_each_and_repeats_one(
     viewer: Driver, tmp_path: Path, gate: threading.Event
 ) -> None:

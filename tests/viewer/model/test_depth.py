@@ -219,6 +219,17 @@ def test_new_depth_keeps_the_focus_where_it_was(
     assert (now.focus_disparity, now.focus_range) == (pytest.approx(expected), pytest.approx(0.8))
 
 
+def test_depth_that_comes_for_the_next_photo_leaves_its_focus() -> None:
+    left = replace(opened(), focused_at=(0.5, 0.5), optics=Optics(focus_disparity=2.0))
+    left = replace(left, models=replace(left.models, left_focus=left.optics))
+    asked = opening.open_source(left, Source("b.png"))
+    scene = scene_of(GRID, asked.source, plan=plan_of(GRID))  # type: ignore[arg-type]
+    shown = opening.show_scene(asked, asked.generation, scene)
+    new_depth = NewDepth((0.0, 1.5) if shown.focused_at is not None else None)
+    deep = opening.show_scene(shown, shown.generation, replace(scene, disparity_range_px=(-4.0, 4.0)), new_depth)
+    assert (deep.optics.focus_disparity, deep.chosen_focus) == (0.0, None)
+
+
 def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> None:
     state = replace(selection.select(opened(), (0.25, 0.75)), brush=Brush("select", tolerance=2.0, is_on=True))
     assert selection.keep_sharp(state) == state, "its depth is not known yet"
