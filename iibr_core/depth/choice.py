@@ -46,7 +46,7 @@ class DepthChoice:
     file: a map that must be used. file_scale: factor from its values to px per view step; None: not given. inverts:
     near and far change places. is_metric: the map or the model gives distances. stretches: a map of another shape
     shows the whole photo. model: a folder or a name, None for one that is there. refine: whether
-    disparity edges are drawn to the photo's.
+    disparity edges are drawn to the photo's. right: file of the right eye's photo, which must be used.
     """
 
     start: DepthStart = "auto"
@@ -57,6 +57,7 @@ class DepthChoice:
     stretches: bool = False
     model: str | None = None
     refine: bool = True
+    right: str | None = None
 
     @property
     def asks_for_model(self) -> bool:

@@ -90,6 +90,8 @@ def find_depth(
     search = _Search(Path(path), photo, choice, grid, max_pixels or math.prod(photo.size))
     if choice.file is not None:
         return search.file(Path(choice.file))
+    if choice.right is not None and "pair" not in skipped and (found := search.pair()) is not None:
+        return found
     kinds: tuple[DepthKind, ...] = get_args(DepthKind)
     failures: tuple[str, ...] = ()
     first = 0 if choice.start == "auto" else kinds.index(choice.start)
@@ -192,7 +194,7 @@ class _Search:
         return self.finish(origin, depth.estimate, found.notes + depth.notes)
 
     def pair(self) -> PhotoWithDepth | None:
-        found = estimate_from_pair(self.path)
+        found = estimate_from_pair(self.path, None if self.choice.right is None else Path(self.choice.right))
         if found is None:
             return None
         estimate, layout = found

@@ -10,6 +10,7 @@ from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_dispar
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import left_picture
+from iibr_core.formats.light_fields.pair_files import read_two_files
 from iibr_core.formats.light_fields.view_files import read_stereo_file
 from iibr_core.runtime.work import report_progress
 from iibr_core.types import InputError, image_size
@@ -18,13 +19,14 @@ MATCHED_PIXELS = 400_000
 """Largest number of pixels of each view; edges are refined by the photo later."""
 
 
-def estimate_from_pair(path: Path) -> tuple[DepthEstimate, str] | None:
+def estimate_from_pair(path: Path, right: Path | None = None) -> tuple[DepthEstimate, str] | None:
     """Return the disparity of the picture that a stereo photo shows, in px from eye to eye, and the kind of file.
 
-    None if the file is no stereo photo or shows another picture than these two. Raises InputError if it is damaged,
+    right: file of the right eye's picture. None if the file is no stereo photo or shows another picture than these two.
+    Raises InputError if it is damaged,
     or its views differ in size or are too small.
     """
-    scene, shown = read_stereo_file(path), left_picture(path)
+    scene, shown = read_stereo_file(path) if right is None else read_two_files(path, right), left_picture(path)
     pictures = [view.picture for view in scene.views] if scene is not None else []
     if scene is None or shown not in pictures:
         return None

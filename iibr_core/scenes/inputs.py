@@ -20,4 +20,4 @@ def named_by(source: Source) -> tuple[Path, ...]:
     """Return the photo or folder, the map and the folders of models that a source names."""
     models = (source.depth.model or "", source.inpaint.partition(":")[2])
     folders = [path for path in map(os.path.expanduser, models) if path and os.path.lexists(path)]  # else: names
-    return tuple(Path(path) for path in (source.path, source.depth.file, *folders) if path)
+    return tuple(Path(path) for path in (source.path, source.depth.file, source.depth.right, *folders) if path)

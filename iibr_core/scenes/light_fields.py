@@ -20,6 +20,7 @@ from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import UNKNOWN, arranged, as_given, numbers_of
+from iibr_core.formats.light_fields.pair_files import TWO_FILES
 from iibr_core.formats.light_fields.views import (
     disparity_range,
     grid_of,
@@ -157,7 +158,8 @@ def _read_all(field: MultiView) -> list[ViewUpdate]:
 def _with_disparity_of(settled: Settled) -> tuple[Settled, FloatImage, tuple[str, ...]]:
     """Return a light field, which may prove to be seen from behind, the disparity (H, W) of its centre, and notes."""
     colors, is_pair = [view.colors for view in settled.views], len(settled.views) == 2
-    max_pixels = MATCHED_PIXELS if is_pair and settled.field.place.is_file() else None
+    is_photo = settled.field.layout == TWO_FILES or settled.field.place.is_file()
+    max_pixels = MATCHED_PIXELS if is_pair and is_photo else None
     values, notes = estimate_within_memory(colors, settled.offsets, 0, settled.coarse.range_px, max_pixels)
     confirmed = confirm(settled, values)
     if confirmed.arrangement != settled.arrangement:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ from viewer.cli.options import (
     DepthOptions,
     Force,
     Grid,
+    RightPath,
     ViewFlip,
     ViewOrder,
     inputs_of_command,
@@ -32,6 +34,7 @@ def depth(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, a stereo photo, or any photo.")],
     output: Annotated[Path, output_option("Map to write: PFM, EXR, NPY or PNG.")],
     options: DepthOptions,
+    right: RightPath = None,
     order: ViewOrder = None,
     grid: Grid = None,
     flip: ViewFlip = None,
@@ -44,7 +47,8 @@ def depth(
 
     Example: iibr depth photo.jpg -o photo_disparity.png
     """
-    source = with_arrangement(Source(str(path), options.choice), Arrangement(order, grid, flip))
+    choice = replace(options.choice, right=None if right is None else str(right))
+    source = with_arrangement(Source(str(path), choice), Arrangement(order, grid, flip))
     require_heeded(context, path)
     check_output(output, inputs_of_command(context, source), force)
     require_model(source.depth)
@@ -55,7 +59,7 @@ def depth(
     notes: tuple[str, ...] = ()
     origin = None
     with show_progress("reading"):
-        if path.is_file() and (source.depth.start != "auto" or find_light_field(path) is None):
+        if path.is_file() and (source.depth.start != "auto" or right is not None or find_light_field(path) is None):
             loaded = load_photo(source)
             name, origin = loaded.photo.name, loaded.origin
             values, notes = loaded.disparity.values, loaded.disparity.notes

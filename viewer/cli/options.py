@@ -86,6 +86,12 @@ def inpainter_from_text(text: str) -> str:
 
 SCENE = "A photo, a stereo photo, or a light field: a folder of views, a quilt, a lenslet image."
 ScenePath = Annotated[Path, typer.Argument(metavar="PATH", help=SCENE)]
+RightPath = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="RIGHT", help="The photo of the right eye, if PATH is that of the left.", show_default=False
+    ),
+]
 Force = Annotated[bool, flag("--force", "Replace an existing output. Inputs are never replaced.")]
 Grid = Annotated[
     GridShape | None,
@@ -201,6 +207,7 @@ class SceneOptions(PhotoOptions):
     ] = None
     order: ViewOrder = None
     flip: ViewFlip = None
+    right: RightPath = None
 
     @property
     def choice(self) -> DepthChoice:
@@ -208,7 +215,8 @@ class SceneOptions(PhotoOptions):
         if self.disparity is not None and (self.depth != "auto" or self.depth_model is not None):
             raise InputError("--disparity gives the depth: leave out --depth and --depth-model")
         file = None if self.disparity is None else str(self.disparity)
-        return replace(super().choice, file=file, file_scale=self.disparity_scale)
+        right = None if self.right is None else str(self.right.absolute())
+        return replace(super().choice, file=file, file_scale=self.disparity_scale, right=right)
 
     def source(
         self, path: Path | str, grid: GridShape | None, focus_disparity: float | None = None, is_literal: bool = False
@@ -224,6 +232,10 @@ def with_arrangement(source: Source, arrangement: Arrangement) -> Source:
     Raises InputError if an order is given for a photo.
     """
     if is_light_field(Path(source.path)):
+        if source.depth.right is not None:
+            raise InputError(
+                f"{source.depth.right}: {source.path} is a light field, not the left eye's photo; leave it out"
+            )
         return replace(source, arrangement=arrangement, grid=None)
     if arrangement.order or arrangement.flip:
         raise InputError(f"--order and --flip are for light fields, which {source.path} is not; leave them out")
@@ -316,7 +328,7 @@ def require_heeded(context: typer.Context, path: Path, unheeded: Set[str] = NOT_
 
 def require_source(source: Source) -> None:
     """Raise InputError if a file that is opened does not exist, or a model that is asked for cannot be used."""
-    for path in (source.path, source.depth.file):
+    for path in (source.path, source.depth.file, source.depth.right):
         if path is not None and not Path(path).exists():
             raise InputError(f"{path}: no such file")
     require_model(source.depth)

@@ -174,7 +174,7 @@ def _notes_on_order(settled: Settled) -> tuple[str, ...]:
             order="the order of their names" if found == UNKNOWN else "the given order"
         )
         return (doubt,) if doubt and (is_folder or settled.verdict == "contrary") else ()
-    if named.is_guess or found.grid != named.grid:
+    if len(named.views) > 2 and (named.is_guess or found.grid != named.grid):
         words.append(f"{found.grid.rows} rows of {found.grid.columns}" if min(found.grid) > 1 else "one line of views")
     flips = TILE_WORDS if _is_tiled(settled) else FLIP_WORDS
     words += filter(None, (ORDER_WORDS[found.order or "rows"], flips[found.flip or "none"]))

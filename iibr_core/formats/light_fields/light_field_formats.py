@@ -23,13 +23,16 @@ if TYPE_CHECKING:
 
 FOLDER_READERS = (
     "camera_folders:read_llff", "data_sets:read_stanford", "data_sets:read_middlebury", "grids:read_grid",
-    "camera_folders:read_posed",
+    "camera_folders:read_posed", "pair_files:read_pair_folder",
 )  # fmt: skip
 """Readers of folders, in the order in which they are asked."""
 FILE_READERS = ("view_files:read_quilt", "view_files:read_lenslet_image", "view_files:read_stereo_file")
 """Readers of files, in the order in which they are asked."""
 
-LAYOUTS = "HCI, Stanford archive, JPEG Pleno, LLFF, nerfstudio, COLMAP, Middlebury, or views/v00_u00.png ..."
+LAYOUTS = (
+    "HCI, Stanford archive, JPEG Pleno, LLFF, nerfstudio, COLMAP, Middlebury, views/v00_u00.png ..., left.jpg and"
+    " right.jpg; or give --grid ROWSxCOLUMNS for views under other names"
+)
 """Layouts of folders, for people."""
 FILES = "give a quilt (..._qs8x6a0.75.png), a lenslet image (..._eslf.png), a stereo photo, or a folder of views"
 

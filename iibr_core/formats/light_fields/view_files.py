@@ -10,6 +10,7 @@ from iibr_core.formats.images.picture_source import PicturePart, PictureSource, 
 from iibr_core.formats.images.side_by_side import refuse_raw_light_field, stated_pair
 from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, is_stereo_mpo, open_lif
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
+from iibr_core.formats.light_fields.pair_files import pair_of, read_two_files
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
 from iibr_core.formats.maps.disparity_file import has_shape_of
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
@@ -78,11 +79,12 @@ def read_lenslet_image(path: Path) -> MultiView | None:
 
 
 def read_stereo_file(path: Path) -> MultiView | None:
-    """Return the two views of a stereo photo, None for other files."""
+    """Return the two views of a stereo photo, or of a file and the other eye's beside it; None for other files."""
     refuse_raw_light_field(path)
     stereo = _stereo_pictures(path)
     if stereo is None:
-        return None
+        files = pair_of(path)
+        return None if files is None else read_two_files(*files)
     layout, left, right = stereo
     views = _view("left", (0, 0), left), _view("right", (0, 1), right)
     return MultiView(path.stem, layout, views, grid=GridShape(1, 2))

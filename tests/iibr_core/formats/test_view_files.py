@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.embedded.embedded import read_embedded
+from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.heic import heic_pair
 from iibr_core.formats.images.iso_boxes import with_primary
 from iibr_core.formats.images.photo import read_photo
@@ -19,7 +21,10 @@ from iibr_core.formats.light_fields import views as views_module
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, is_light_field, open_light_field
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.quilts import MAX_USUAL_SIDE_PX, Quilt, lay_out, quilt_for, quilt_named, tagged
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.scenes.light_fields import find_disparity
+from iibr_core.scenes.scene import Source
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
 
 HEIGHT, WIDTH = 6, 9
 RNG = np.random.default_rng(0)
@@ -291,3 +296,37 @@ def test_a_name_states_the_quilt_and_gets_one_tag() -> None:
     for name, fault in (("a_qs8x6a0.75.png", "too few"), ("a_qs5x300a1.png", "more than 1024 views")):
         with pytest.raises(InputError, match=fault):
             quilt_named(Path(name), ImageSize(5, 8) if fault == "too few" else ImageSize(900, 900))
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [
+        ("left.png", "right.png"),
+        ("DSC_7_L.png", "DSC_7_R.png"),
+        ("r/l-3.png", "r/r-3.png"),
+        ("imgLeft.png", "imgRight.png"),
+    ],
+)
+def test_two_files_are_a_pair_where_names_and_pictures_agree(tmp_path, left, right) -> None:
+    (tmp_path / "r").mkdir()
+    for name, s in ((left, 0), (right, 2)):
+        Image.fromarray((view_of_square(ViewOffset(0, s)) * 255).astype(np.uint8)).save(tmp_path / name)
+    for path in (tmp_path / left, tmp_path / right, (tmp_path / left).parent):
+        scene = open_light_field(path)
+        assert [view.path for view in scene.views] == [tmp_path / left, tmp_path / right]
+        assert scene.layout == "stereo, two files"
+    Image.fromarray(pictures(1, 40, 48)[0]).save(tmp_path / right)
+    assert find_light_field(tmp_path / left) is None
+
+
+def test_two_pictures_of_one_scene_are_a_pair_under_any_names(tmp_path) -> None:
+    folder = tmp_path / "two"
+    folder.mkdir()
+    for name, s in (("a.png", 0), ("b.png", 2)):
+        Image.fromarray((view_of_square(ViewOffset(0, s)) * 255).astype(np.uint8)).save(folder / name)
+    assert find_light_field(folder) is None
+    _, values, _ = find_disparity(Source(str(folder)))
+    assert np.median(values[16:24, 20:28]) == pytest.approx(2 * FOREGROUND, abs=0.4)
+    found = open_with_depth(folder / "a.png", DepthChoice(right=str(folder / "b.png")))
+    assert found.origin.words == "the photo's two views (stereo, two files)"
+    assert np.median(found.disparity.values[16:24, 20:28]) == pytest.approx(2 * FOREGROUND, abs=0.6)
