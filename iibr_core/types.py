@@ -13,6 +13,7 @@ Colour          encoded by sRGB's curve, 1 = white, as photos are; HDR values ex
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -42,6 +43,10 @@ class ViewOffset(NamedTuple):
 
     t: float
     s: float
+
+
+Wanted = Callable[[], Collection[ViewOffset] | None]
+"""Function that returns the offsets of the views to make or read, None for all views of the grid."""
 
 
 class ImageSize(NamedTuple):

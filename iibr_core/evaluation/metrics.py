@@ -48,18 +48,12 @@ def ssim(image: FloatImage, truth: FloatImage) -> float:
 
 def flip_map(image: Image, truth: Image) -> FloatImage:
     """Return FLIP (Andersson et al. 2020) of each pixel (H, W) at 67 pixels per degree, 0 for no visible difference."""
-    from flip_evaluator import evaluate
-
-    of_pixels, _, _ = evaluate(*_writable_floats(truth, image), "LDR", True, False)
-    return np.asarray(of_pixels, np.float32).reshape(truth.shape[:2])
+    return _flip(image, truth, False).reshape(truth.shape[:2])
 
 
 def flip_picture(image: Image, truth: Image) -> FloatImage:
     """Return `flip_map` in the colours of its authors (magma), (H, W, 3); black: no difference."""
-    from flip_evaluator import evaluate
-
-    shown, _, _ = evaluate(*_writable_floats(truth, image), "LDR", True, True)
-    return np.asarray(shown, np.float32)
+    return _flip(image, truth, True)
 
 
 def flip(image: Image, truth: Image, mask: Mask | None = None) -> float:
@@ -69,7 +63,10 @@ def flip(image: Image, truth: Image, mask: Mask | None = None) -> float:
     return float(of_pixels.mean(dtype=np.float64)) if of_pixels.size else math.nan
 
 
-def _writable_floats(*images: Image) -> list[FloatImage]:
-    """Return copies, 1 = white: FLIP's binding refuses arrays that may not be written to."""
-    floats = (image / np.float32(255) if image.dtype == np.uint8 else image for image in images)
-    return [np.array(image, np.float32, order="C") for image in floats]
+def _flip(image: Image, truth: Image, in_colors: bool) -> FloatImage:
+    """Return FLIP as values or in colours. Its binding refuses arrays that may not be written to, hence copies."""
+    from flip_evaluator import evaluate
+
+    floats = (pixels / np.float32(255) if pixels.dtype == np.uint8 else pixels for pixels in (truth, image))
+    shown, _, _ = evaluate(*(np.array(pixels, np.float32, order="C") for pixels in floats), "LDR", True, in_colors)
+    return np.asarray(shown, np.float32)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.outputs import write_file
@@ -89,8 +90,6 @@ def _write_video(
 
 def _write_pictures(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> None:
     """Write an animated GIF or WebP."""
-    from PIL import Image
-
     pictures = [np.ascontiguousarray(pixels) for pixels in frames]
     options: dict[str, Any]
     if path.suffix.lower() == ".gif":
@@ -104,8 +103,6 @@ def _write_pictures(path: Path, temporary: Path, frames: Iterable[NDArray[np.uin
 
 def _quantized(frames: Sequence[NDArray[np.uint8]]) -> list[Any]:
     """Return GIF frames with one dithered palette; flat parts would flicker with several."""
-    from PIL import Image
-
     chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, PALETTE_SAMPLES).astype(int))]
     step = max(max(chosen[0].shape[:2]) // PALETTE_SIDE_PX, 1)
     sheet = np.concatenate([pixels[::step, ::step] for pixels in chosen], axis=1)

@@ -3,7 +3,7 @@ wide apertures and viewpoints between the views work as with a photo; or with vi
 """
 
 import math
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -18,7 +18,13 @@ from iibr_core.depth.multi_view.settle import Settled, confirm, settle
 from iibr_core.depth.stereo_pair import MATCHED_PIXELS
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.formats.light_fields.multi_view_scene import (
+    GridIndex,
+    MultiView,
+    common_size,
+    grid_of_every,
+    thinned,
+)
 from iibr_core.formats.light_fields.order import UNKNOWN, arranged, as_given, numbers_of
 from iibr_core.formats.light_fields.pair_files import TWO_FILES
 from iibr_core.formats.light_fields.views import (
@@ -33,8 +39,9 @@ from iibr_core.formats.light_fields.views import (
 )
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.method.memory import require_memory, view_bytes
+from iibr_core.method.memory import budget_bytes, require_memory, view_bytes
 from iibr_core.runtime.work import Cancelled, report_progress
+from iibr_core.scenes.found_disparity import FoundDisparity, key_of_field, load_found, store_found
 from iibr_core.scenes.scene import READING, Scene, Source
 from iibr_core.types import (
     FloatImage,
@@ -43,11 +50,14 @@ from iibr_core.types import (
     InputError,
     ViewOffset,
     ViewUpdate,
+    Wanted,
     image_size,
 )
 
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Range of the focus in a light field without disparity, in pixels per view step."""
+MAX_PIXELS, MAX_VIEWS = 350_000_000, 2048
+"""Largest number of pixels of all views, and of views, that graphics cards hold with ease."""
 FROM_VIEWS = "the views themselves"
 
 
@@ -62,23 +72,41 @@ class LoadedField:
     views: Iterator[ViewUpdate]
 
 
-def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | None = None) -> Iterator[LoadedField]:
+def load_light_field(
+    source: Source, takes_drafts: bool, known: FloatImage | None = None, wanted: Wanted = lambda: None
+) -> Iterator[LoadedField]:
     """Yield the light field of a folder or file, again each time its disparity is known better.
 
     takes_drafts: views without disparity come as read, then with a coarse disparity, then with the final one; otherwise
-    the field comes once, when all is known. known: disparity of the centre view that was found before. The views of a
-    field must be taken before the next field is asked for.
+    the field comes once, when all is known. known: disparity of the centre view that was found before. wanted: called
+    after the centre view of a field with disparity was taken; only these views come. The views of a field must be taken
+    before the next field is asked for.
     """
     field = open_field(source)
-    grid, (size, views) = grid_of(field), read_views(field)
-    _require_field(field.name, size, grid)
     given, map_file = known, source.depth.file
+    is_found = given is None and map_file is None and not field.disparity and len(field.views) > 1
+    key = key_of_field(field, source.arrangement) if is_found else ""
+    found = load_found(key) if is_found else None
+    if found is not None and found.arrangement != UNKNOWN:
+        field = arranged(field, found.arrangement)
+    wanted = (
+        wanted if len(field.views) == math.prod(grid_of(field)) else lambda: None
+    )  # a star's views stand for others
+    grid = grid_of(field)
+    is_centre_known = any(field.views[index].place == grid.centre for index in field.disparity)
+    reads_all = found is None and given is None and map_file is None and not is_centre_known
+    size, views = read_views(field, (lambda: None) if reads_all else wanted)
+    _require_field(field.name, size, grid)
     if map_file is not None:
         given = read_disparity(Path(map_file), size, source.depth.file_scale or 1.0).values
     centre = next(views)
     scene = _scene_as_read(source, field, centre, disparity_range(field))
     if (scene.has_view_disparity and given is None) or max(grid) == 1:
         yield LoadedField(scene, chain((centre,), views))
+        return
+    if found is not None and found.values.shape == size:
+        scene = replace(scene, arrangement=found.arrangement, notes=found.notes)
+        yield _with_disparity(scene, chain((centre,), views), _offsets_from(field, centre), found.values, wanted)
         return
     read: list[ViewUpdate] = []
     if takes_drafts:
@@ -88,24 +116,39 @@ def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | Non
             read.append(view)
             report_progress(len(read), len(field.views), READING)
     if given is None and centre.disparity is None:
-        yield from _with_found_disparity(scene, field, read, takes_drafts)
+        yield from _with_found_disparity(scene, field, read, takes_drafts, wanted, key)
         return
     origin = scene.depth_source if given is None else Path(map_file).name if map_file else FROM_VIEWS
     values = centre.disparity if given is None else given
     assert values is not None
-    yield _with_disparity(scene, read, _offsets_of(field, read), values, origin)
+    yield _with_disparity(scene, read, _offsets_from(field, centre), values, wanted, origin)
 
 
-def _offsets_of(field: MultiView, views: Sequence[ViewUpdate]) -> list[ViewOffset]:
-    """Return the viewpoints of views from the first of them, in steps of the grid."""
+def _offsets_from(field: MultiView, centre: ViewUpdate) -> dict[GridIndex, ViewOffset]:
+    """Return the viewpoints of the views from one of them, in steps of the grid."""
     offsets = offsets_by_place(field)
-    t, s = offsets[views[0].row, views[0].column]
-    return [ViewOffset(at.t - t, at.s - s) for at in (offsets[view.row, view.column] for view in views)]
+    t, s = offsets[centre.row, centre.column]
+    return {place: ViewOffset(at.t - t, at.s - s) for place, at in offsets.items()}
 
 
 def open_field(source: Source) -> MultiView:
     """Return the light field of a source, in the order that is known of it."""
-    return _in_known_order(open_light_field(Path(source.path), source.arrangement), source)
+    return _in_known_order(_opened(source), source)
+
+
+def _opened(source: Source) -> MultiView:
+    """Return the light field of a source: every n-th row and column where the user asks for them or more do not fit."""
+    field, given = open_light_field(Path(source.path), source.arrangement), source.arrangement.grid
+    if field.grid is None or (given is not None and math.prod(given) == len(field.views)):
+        return field
+    steps = range(1, max(field.grid) + 1)
+    if given is not None:
+        every = next((n for n in steps if grid_of_every(field.grid, n) == given), 1)
+    else:
+        pixels, room = math.prod(common_size(field.views[:1])), min(MAX_PIXELS, budget_bytes() // view_bytes(1, False))
+        grids = {n: math.prod(grid_of_every(field.grid, n)) for n in steps}
+        every = next((n for n in steps if grids[n] * pixels <= room and grids[n] <= MAX_VIEWS), 1)
+    return thinned(field, every)
 
 
 def _in_known_order(field: MultiView, source: Source) -> MultiView:
@@ -120,7 +163,7 @@ def is_order_known(field: MultiView, source: Source) -> bool:
 
 def open_settled(source: Source) -> tuple[MultiView, tuple[str, ...]]:
     """Return a light field in its right order, found from its views where it is not known, and notes."""
-    field = open_light_field(Path(source.path), source.arrangement)
+    field = _opened(source)
     if is_order_known(field, source):
         return _in_known_order(field, source), field.notes
     settled = settle(field, _read_all(field), source.arrangement)
@@ -132,7 +175,7 @@ def find_disparity(source: Source) -> tuple[str, FloatImage, tuple[str, ...]]:
 
     Of a pair it is that of the left view.
     """
-    field = open_light_field(Path(source.path), source.arrangement)
+    field = _opened(source)
     read = _read_all(field)
     report_progress(0, 0, FINDING)
     settled, values, note = _with_disparity_of(settle(field, read, source.arrangement, is_left=True))
@@ -181,11 +224,12 @@ def read_dense(
 
 
 def _with_found_disparity(
-    scene: Scene, field: MultiView, views: Sequence[ViewUpdate], takes_drafts: bool
+    scene: Scene, field: MultiView, views: Sequence[ViewUpdate], takes_drafts: bool, wanted: Wanted, key: str
 ) -> Iterator[LoadedField]:
     """Yield the field with disparity found from its views, in the order that they show.
 
-    It comes without disparity, and with a note, if no order fits or the views are too small.
+    It comes without disparity, and with a note, if no order fits or the views are too small. key: name under which the
+    disparity is kept.
     """
     report_progress(0, 0, FINDING)
     try:
@@ -197,11 +241,19 @@ def _with_found_disparity(
         return
     if takes_drafts:
         draft = _settled_scene(scene, settled)
-        yield _with_disparity(draft, settled.views, settled.offsets, settled.coarse.values, FROM_VIEWS, is_final=False)
+        yield _with_disparity(
+            draft, settled.views, _offsets_of(settled), settled.coarse.values, lambda: None, is_final=False
+        )
     settled, values, note = _with_disparity_of(settled)
     final = _settled_scene(scene, settled)
     final = replace(final, notes=(*final.notes, *note))
-    yield _with_disparity(final, settled.views, settled.offsets, values, FROM_VIEWS)
+    if key:
+        store_found(key, FoundDisparity(values, settled.arrangement, final.notes))
+    yield _with_disparity(final, settled.views, _offsets_of(settled), values, wanted)
+
+
+def _offsets_of(settled: Settled) -> dict[GridIndex, ViewOffset]:
+    return {(view.row, view.column): at for view, at in zip(settled.views, settled.offsets)}
 
 
 def _settled_scene(scene: Scene, settled: Settled) -> Scene:
@@ -220,13 +272,14 @@ def _with_problem(scene: Scene, error: InputError) -> Scene:
 
 def _with_disparity(
     scene: Scene,
-    views: Sequence[ViewUpdate],
-    offsets: Sequence[ViewOffset],
+    views: Iterable[ViewUpdate],
+    offsets: Mapping[GridIndex, ViewOffset],
     values: FloatImage,
-    origin: str,
+    wanted: Wanted,
+    origin: str = FROM_VIEWS,
     is_final: bool = True,
 ) -> LoadedField:
-    """Return the field with the disparity (H, W) of its centre view, carried to the others."""
+    """Return the field with the disparity (H, W) of its centre view, the first, carried to the others."""
     scene = replace(
         scene,
         disparity_range_px=(float(values.min()), float(values.max())),
@@ -234,16 +287,29 @@ def _with_disparity(
         has_view_disparity=True,
         subject_disparity_px=subject_disparity(values),
     )
-    return LoadedField(scene, _carried(views, offsets, values, is_final))
+    marked = (replace(view, is_final=is_final) for view in views)
+    return LoadedField(scene, _carried(marked, offsets, values, scene.grid, wanted))
 
 
 def _carried(
-    views: Sequence[ViewUpdate], offsets: Sequence[ViewOffset], values: FloatImage, is_final: bool
+    views: Iterator[ViewUpdate],
+    offsets: Mapping[GridIndex, ViewOffset],
+    values: FloatImage,
+    grid: GridShape,
+    wanted: Wanted,
 ) -> Iterator[ViewUpdate]:
-    """Yield the views with the disparity of the centre view, the first, carried to each of them."""
+    """Yield the centre view, then those of the others that are wanted, with the disparity of the centre view."""
+    centre = next(views)
+    yield replace(centre, disparity=values)
+    chosen = wanted()
+    others = (
+        (view, offsets[view.row, view.column])
+        for view in views
+        if chosen is None or grid.offset(view.row, view.column) in chosen
+    )
+    farthest = max(abs(step) for offset in offsets.values() for step in offset)
     with suppress(Cancelled):
-        for index, disparity in carry(values, [view.colors for view in views], offsets):
-            yield replace(views[index], disparity=disparity, is_final=is_final)
+        yield from carry(values, centre.colors, others, farthest)
 
 
 def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_px: tuple[float, float] | None) -> Scene:

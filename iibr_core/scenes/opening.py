@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Collection, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -35,10 +35,7 @@ from iibr_core.scenes.scene import (
     WantedPhoto,
 )
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import InputError, ViewOffset, ViewUpdate
-
-Wanted = Callable[[], Collection[ViewOffset] | None]
-"""Function that returns the offsets of the views to make, None for all views of the grid."""
+from iibr_core.types import InputError, ViewOffset, ViewUpdate, Wanted
 
 
 def results_of(
@@ -46,12 +43,11 @@ def results_of(
 ) -> Generator[SceneReady | ViewReady]:
     """Yield all results of opening a scene: the scene, then each of its views; a light field perhaps more than once.
 
-    nearest_to: returns the viewpoint near which views are made first. wanted: called once, after the scene was taken;
-    for photos only.
+    nearest_to: returns the viewpoint near which views are made first. wanted: called after the scene was taken.
     """
     try:
         if is_light_field(Path(request.source.path)):
-            yield from _results_of_light_field(request)
+            yield from _results_of_light_field(request, wanted)
         else:
             yield from _results_of_photo(request, nearest_to, wanted)
     finally:
@@ -133,14 +129,15 @@ def _results_of_photo(
     yield from _count_views(request.generation, views, scene, wanted)
 
 
-def _results_of_light_field(request: SceneRequest) -> Iterator[SceneReady | ViewReady]:
+def _results_of_light_field(request: SceneRequest, wanted: Wanted) -> Iterator[SceneReady | ViewReady]:
     from iibr_core.scenes.light_fields import load_light_field  # photos start without its modules
 
-    for field in load_light_field(request.source, request.takes_drafts):
+    for field in load_light_field(request.source, request.takes_drafts, wanted=wanted):
+        is_partial = field.scene.has_view_disparity and not field.scene.missing_views
         centre = next(field.views)
         yield SceneReady(request.generation, field.scene, None, centre)
         rest = itertools.takewhile(lambda _: not is_stopped(), itertools.chain((centre,), field.views))
-        yield from _count_views(request.generation, rest, field.scene)
+        yield from _count_views(request.generation, rest, field.scene, wanted if is_partial else lambda: None)
         if is_stopped():
             return
 

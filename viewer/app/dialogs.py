@@ -8,6 +8,8 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
+from imgui_bundle import portable_file_dialogs as dialogs
+
 from iibr_core.exports.kinds import export_kind
 from viewer.model.state.prompts import ChoiceOf, ExportPrompt, SavePrompt
 
@@ -55,16 +57,12 @@ def has_dialogs() -> bool:
 
 def show_error(message: str) -> None:
     """Show a message until the user closes it, where this system has dialogs."""
-    from imgui_bundle import portable_file_dialogs as dialogs
-
     if has_dialogs():
         dialogs.message("iibr", message, dialogs.choice.ok, dialogs.icon.error).result()
 
 
 def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:
     """Open the dialog for a file or folder, in the folder that holds `beside`, or is it if a separator ends it."""
-    from imgui_bundle import portable_file_dialogs as dialogs
-
     folder = os.path.abspath(os.path.dirname(os.path.expanduser(beside)))
     start = os.path.join(folder, "") if beside else ""
     title, endings = CHOICES[what][0], CHOICES[what][1].split()
@@ -77,8 +75,6 @@ def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:
 
 def ask_for_place(prompt: SavePrompt | ExportPrompt) -> Dialog:
     """Open the dialog for the file or folder that a prompt writes."""
-    from imgui_bundle import portable_file_dialogs as dialogs
-
     path = os.path.abspath(os.path.expanduser(prompt.path))
     title = "Save the picture" if isinstance(prompt, SavePrompt) and prompt.what == "picture" else "Save the depth map"
     if isinstance(prompt, ExportPrompt):

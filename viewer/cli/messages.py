@@ -19,7 +19,7 @@ BETTER_DEPTH = (
 REMEDIES = {
     Remedy.REPLACE: "give --force to replace it, or choose another name",
     Remedy.PLACE: "write to another place",
-    Remedy.SMALLER: "lower --grid or --max-pixels",
+    Remedy.SMALLER: "lower --grid, or --max-pixels for a photo",
     Remedy.DEPTH: "get it with `iibr models get NAME`, or give a depth map with --disparity FILE",
     Remedy.DOWNLOAD: "check the network and try again, name a mirror in HF_ENDPOINT, or use an ONNX file of your own",
     Remedy.VIEW_ORDER: (

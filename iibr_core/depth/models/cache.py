@@ -1,4 +1,4 @@
-"""Estimates kept on disk by the photo's pixels and the model's files; the least recently used go.
+"""Estimates kept on disk, as by the photo's pixels and the model's files; the least recently used go.
 
 A cache that cannot be read or written counts as empty.
 """
@@ -42,26 +42,37 @@ def key_of(pixels: FloatImage, files: Iterable[Path]) -> str:
 
 def load(key: str) -> DepthEstimate | None:
     """Return the estimate of this key, None if there is none or it is damaged."""
-    path = cache_folder() / f"{key}.npz"
-    try:
-        with np.load(path, allow_pickle=False) as kept:
-            focal = float(kept["focal_ratio"])
-            meaning = cast(Meaning, str(kept["meaning"]))
-            estimate = DepthEstimate(np.array(kept["values"], np.float32), meaning, focal or None)
-        os.utime(path)
-    except Exception:  # missing, or damaged in one of the many ways that numpy meets
-        return None
-    return estimate
+    kept = load_map(key)
+    with suppress(ValueError, TypeError):
+        meaning, focal_ratio = json.loads(kept[1] if kept is not None else "")
+        return None if kept is None else DepthEstimate(kept[0], cast(Meaning, meaning), focal_ratio)
+    return None
 
 
 def store(key: str, estimate: DepthEstimate) -> None:
     """Keep an estimate; the least recently used ones go if all exceed MAX_BYTES."""
+    store_map(key, estimate.values, json.dumps([estimate.meaning, estimate.focal_ratio]))
+
+
+def load_map(key: str) -> tuple[FloatImage, str] | None:
+    """Return the values (H, W) of this key and the text about them, None if there are none or they are damaged."""
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            found = np.array(kept["values"], np.float32), str(kept["meaning"])
+        os.utime(path)
+    except Exception:  # missing, or damaged in one of the many ways that numpy meets
+        return None
+    return found
+
+
+def store_map(key: str, values: FloatImage, meaning: str) -> None:
+    """Keep values (H, W) with a text about them, as `store` does."""
     folder = cache_folder()
     with suppress(OSError, InputError):  # read-only or full: the estimate is made again the next time
         folder.mkdir(parents=True, exist_ok=True)
         with write_file(folder / f"{key}.npz") as temporary:
-            focal = estimate.focal_ratio or 0.0
-            np.savez(temporary, meaning=estimate.meaning, values=estimate.values, focal_ratio=focal)
+            np.savez(temporary, meaning=meaning, values=values)
         total = 0
         for entry in sorted(folder.glob("*.npz"), key=lambda entry: entry.stat().st_mtime_ns, reverse=True):
             total += entry.stat().st_size
@@ -80,7 +91,7 @@ def seconds_of(model: str) -> float | None:
 def note_seconds(model: str, seconds: float) -> None:
     """Note the time that a model's estimate took."""
     path, noted = cache_folder() / SECONDS_FILE, {}
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, TypeError):
         noted = dict(json.loads(path.read_text("utf-8")))
     with suppress(OSError, InputError):
         path.parent.mkdir(parents=True, exist_ok=True)

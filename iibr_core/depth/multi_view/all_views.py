@@ -9,6 +9,8 @@ other map confirms, or that more maps contradict than confirm, are filled by sim
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
 from math import hypot
 
 import numpy as np
@@ -22,7 +24,7 @@ from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import part_of_job, report_progress
-from iibr_core.types import FloatImage, StoredColors, ViewOffset, image_size
+from iibr_core.types import FloatImage, StoredColors, ViewOffset, ViewUpdate, image_size
 
 
 def estimate_all(
@@ -77,24 +79,26 @@ def reconcile(
 
 
 def carry(
-    values: FloatImage, views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
-) -> Iterator[tuple[int, FloatImage]]:
-    """Yield the index of each view and the disparity (H, W) that the map of the first one shows in it.
+    values: FloatImage, reference: StoredColors, others: Iterator[tuple[ViewUpdate, ViewOffset]], farthest: float
+) -> Iterator[ViewUpdate]:
+    """Yield each of the other views with the disparity (H, W) that the map of the reference shows in it.
 
-    offsets: viewpoints from the first view. Holes are filled by similar colours around them.
+    others: with their viewpoints from the reference; farthest: largest distance of a viewpoint along an axis. Holes are
+    filled by similar colours around them.
     """
-    farthest = max(abs(step) for offset in offsets for step in offset)
-    rays = rays_of_photo(encoded_from_stored(views[0]), values, farthest, 0)
+    if (first := next(others, None)) is None:
+        return
+    rays = rays_of_photo(encoded_from_stored(reference), values, farthest, 0)
 
-    def carry_to(index: int) -> tuple[int, FloatImage]:
-        if index == 0:
-            return index, values
-        view, _ = Renderer().visible(rays, offsets[index])
+    def carry_to(other: tuple[ViewUpdate, ViewOffset]) -> ViewUpdate:
+        update, offset = other
+        view, _ = Renderer().visible(rays, offset)
         known = np.where(view.occluded, np.float32(np.nan), view.disparity)
         is_known = not np.isnan(known).all()
-        return index, fill_disparity_by_color(encoded_from_stored(views[index]), known) if is_known else values
+        filled = fill_disparity_by_color(encoded_from_stored(update.colors), known) if is_known else values
+        return replace(update, disparity=filled)
 
-    yield from side_by_side(carry_to, range(len(views)))
+    yield from side_by_side(carry_to, chain((first,), others))
 
 
 def _warp(

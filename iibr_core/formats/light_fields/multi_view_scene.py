@@ -152,6 +152,35 @@ def place_on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:
     return replace(scene, views=views, grid=GridShape(len(rows), len(columns)))
 
 
+def grid_of_every(grid: GridShape, every: int) -> GridShape:
+    """Return the grid of every n-th row and column from the middle."""
+    return GridShape(*(len(range(length // 2 % every, length, every)) for length in grid))
+
+
+def thinned(scene: MultiView, every: int) -> MultiView:
+    """Return a scene with every n-th row and column of its grid, the middle ones among them, and a note."""
+    if every == 1 or scene.grid is None:
+        return scene
+    places = [view.place or (0, 0) for view in scene.views]
+    kept = [k for k, at in enumerate(places) if all(n % every == m // 2 % every for n, m in zip(at, scene.grid))]
+    views = tuple(replace(scene.views[k], place=(places[k][0] // every, places[k][1] // every)) for k in kept)
+    numbers = [scene.numbers[k] if len(scene.numbers[k]) == 2 else places[k] for k in kept if scene.numbers]
+    ranks = [sorted(set(axis)) for axis in zip(*numbers)]
+    grid = grid_of_every(scene.grid, every)
+    words, part = (f"{shape.columns}x{shape.rows}" for shape in (scene.grid, grid))
+    return replace(
+        scene,
+        layout=scene.layout.replace(words, f"{part} of {words}"),
+        views=views,
+        grid=grid,
+        disparity={new: scene.disparity[old] for new, old in enumerate(kept) if old in scene.disparity},
+        numbers=tuple((ranks[0].index(v), ranks[1].index(u)) for v, u in numbers),
+        stated_grid=None,
+        stated_centre=None,
+        notes=(*scene.notes, f"One of every {every} rows and columns of views is used: {part} of {words}."),
+    )
+
+
 def turned_upright(scene: MultiView, orientation: int) -> MultiView:
     """Return a scene whose viewpoints lie along the axes of the pictures as stored, along those as shown.
 

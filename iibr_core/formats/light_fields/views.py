@@ -1,7 +1,8 @@
 """Read the views of a light field on disk whose views fill a grid, the centre first."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import tee
 from statistics import fmean
 
 from iibr_core.color import stored_from_encoded
@@ -18,6 +19,7 @@ from iibr_core.types import (
     StoredColors,
     ViewOffset,
     ViewUpdate,
+    Wanted,
     image_size,
 )
 
@@ -35,10 +37,13 @@ def grid_of(scene: MultiView) -> GridShape:
     return scene.grid
 
 
-def read_views(scene: MultiView) -> tuple[ImageSize, Iterator[ViewUpdate]]:
-    """Return the size of the views, and an iterator that reads them: the centre first, then the nearest to it."""
+def read_views(scene: MultiView, wanted: Wanted = lambda: None) -> tuple[ImageSize, Iterator[ViewUpdate]]:
+    """Return the size of the views, and an iterator that reads them: the centre first, then the nearest to it.
+
+    wanted: called after the centre was taken; returns the offsets of the views to read, None for all.
+    """
     grid, size = grid_of(scene), common_size(scene.views)
-    return size, _iterate_views(scene, grid, size)
+    return size, _iterate_views(scene, grid, size, wanted)
 
 
 def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
@@ -116,10 +121,17 @@ def _indices(scene: MultiView) -> dict[GridIndex, int]:
     return {view.place: index for index, view in enumerate(scene.views) if view.place is not None}
 
 
-def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterator[ViewUpdate]:
+def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize, wanted: Wanted) -> Iterator[ViewUpdate]:
     indices = _indices(scene)
-    order = [at for at in _nearest_to_centre(grid) if at in indices]
-    for at, colors in zip(order, _read_colors(scene, [indices[at] for at in order])):
+    first, *others = (at for at in _nearest_to_centre(grid) if at in indices)
+
+    def places() -> Iterator[GridIndex]:
+        yield first
+        chosen = wanted()
+        yield from (at for at in others if chosen is None or grid.offset(*at) in chosen)
+
+    to_read, to_place = tee(places())
+    for colors, at in zip(_read_colors(scene, (indices[at] for at in to_read)), to_place):
         index = indices[at]
         if image_size(colors) != size:
             path = scene.views[index].path
@@ -128,7 +140,7 @@ def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterat
         yield ViewUpdate(*at, colors, disparity)
 
 
-def _read_colors(scene: MultiView, indices: list[int]) -> Iterator[StoredColors]:
+def _read_colors(scene: MultiView, indices: Iterable[int]) -> Iterator[StoredColors]:
     """Yield the colours (H, W, 3) of views; a picture that holds several of them is decoded once."""
     decoded: tuple[PictureSource, Picture] | None = None
     for index in indices:

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from iibr_core.types import FloatImage
 
+HUES = "HSV"
+"""Name of the scale of hues, which ends as it begins."""
 SCALES = {
     "turbo": "30123b 4040a2 466be3 4293ff 28bbec 18dcc3 31f299 6bfe64 a2fc3c cced34 edd03a fdad35 fb8022 ec520f d23105"
     " ac1701 7a0403",
@@ -22,6 +24,7 @@ SCALES = {
     " aadc32 d5e21a fde725",
     "cividis": "00224e 002e6a 1a386f 32436d 434e6c 535a6d 61656f 6f7073 7c7c78 8b8778 9a9376 aaa073 bbad6d ccba64"
     " ddc858 efd748 fee838",
+    HUES: "ff0000 ffff00 00ff00 00ffff 0000ff ff00ff ff0000",
     "Spectral": "5e4fa2 3288bd 66c2a5 abdda4 e6f598 ffffbf fee08b fdae61 f46d43 d53e4f 9e0142",
 }
 """Colours at equal steps, from the low end to the high one, by the names of matplotlib and OpenCV."""
@@ -31,25 +34,48 @@ MAX_MEDIAN_DISTANCE, MAX_DISTANCE = 8.0, 40.0
 MIN_RANGE = 0.25
 """Smallest share of its scale that a map takes."""
 COLORS_AT_ONCE = 4096
+MARK_LEVELS = 12
+"""Largest distance of black and white, which mark unknown values, from 0 and 255."""
+MIN_MARKED_SHARE, MARKED_QUANTILE = 0.01, 0.7
+"""Share of such pixels from which a lossy file mixes their colour into others, and share of pixels that it leaves."""
+MAX_HUES_COST = 0.5
+"""Largest cost of hues, as a share of the next scale's, with which they are recognised: other scales hold hues, too."""
+
+
+class CyclicColorsError(ValueError):
+    """The colours of a map run in a circle, so that near and far look alike."""
 
 
 def values_of_colors(pixels: NDArray[Any]) -> tuple[FloatImage, str] | None:
     """Return places in a scale of colours (H, W), 0..1, and its name; None for pictures in other colours.
 
-    pixels: (H, W, 3) uint8 or uint16.
+    Black and white are NaN, unless the scale holds them. pixels: (H, W, 3) uint8 or uint16. Raises CyclicColorsError.
     """
     shift = 8 * (pixels.dtype.itemsize - 1)
     red, green, blue = np.moveaxis((pixels[..., :3] >> shift).astype(np.uint32), 2, 0)
     packed = red << 16 | green << 8 | blue
     colors, where, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
-    candidates = [(name, *_nearest(colors, _scale(text))) for name, text in SCALES.items()]
-    name, places, distances = min(candidates, key=lambda scale: (np.minimum(scale[2], MAX_DISTANCE) * counts).sum())
-    order = np.argsort(distances)
-    share = np.cumsum(counts[order]) / packed.size
-    median, large = (distances[order][np.searchsorted(share, quantile)] for quantile in (0.5, 0.95))
-    values = places[where].reshape(packed.shape)
-    if median > MAX_MEDIAN_DISTANCE or large > MAX_DISTANCE or np.ptp(np.percentile(values, (2, 98))) < MIN_RANGE:
+    channels = np.stack([colors >> 16, colors >> 8 & 255, colors & 255])
+    is_mark = (channels.max(axis=0) <= MARK_LEVELS) | (channels.min(axis=0) >= 255 - MARK_LEVELS)
+    weights = np.where(is_mark, 0, counts)
+    if not weights.any():
         return None
+    found = {name: _nearest(colors, _scale(text)) for name, text in SCALES.items()}
+    costs = {name: float((np.minimum(away, MAX_DISTANCE) * weights).sum()) for name, (_, away) in found.items()}
+    name = min(costs.keys() - {HUES}, key=lambda scale: costs[scale])
+    name = HUES if costs[HUES] < MAX_HUES_COST * costs[name] else name
+    places, distances = found[name]
+    order = np.argsort(distances)
+    share = np.cumsum(weights[order]) / weights.sum()
+    is_marked = counts @ is_mark > MIN_MARKED_SHARE * packed.size
+    quantiles = 0.5, MARKED_QUANTILE if is_marked else 0.95
+    median, large = (distances[order][np.searchsorted(share, quantile)] for quantile in quantiles)
+    is_known = np.where(is_mark, distances <= MARK_LEVELS, ~is_marked | (distances <= MAX_DISTANCE))
+    values = np.where(is_known, places, np.float32(np.nan))[where].reshape(packed.shape)
+    if median > MAX_MEDIAN_DISTANCE or large > MAX_DISTANCE or np.ptp(np.nanpercentile(values, (2, 98))) < MIN_RANGE:
+        return None
+    if name == HUES:
+        raise CyclicColorsError
     return values, name
 
 

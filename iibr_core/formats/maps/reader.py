@@ -1,4 +1,4 @@
-"""Reads maps with one value per pixel: PFM, NPY, NPZ, and every kind of picture, also one that shows it in colours.
+"""Reads maps with one value per pixel: PFM, NPY, NPZ, those of other programs, and pictures, also in colours.
 
 Renderers write depth as a channel of an OpenEXR picture, beside its colours; this is read, too.
 """
@@ -18,8 +18,9 @@ from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.images.rgbd import GREY_TOLERANCE, MAX_COLORED_SHARE
-from iibr_core.formats.maps.color_maps import values_of_colors
+from iibr_core.formats.maps.color_maps import CyclicColorsError, values_of_colors
 from iibr_core.formats.maps.npy import read_named_array
+from iibr_core.formats.maps.other_maps import map_fault, read_other_map
 from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
 from iibr_core.formats.maps.writer import KEY, MapText, text_from
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
@@ -77,15 +78,25 @@ def read_map_file(path: Path) -> MapFile:
             values = np.array(array, np.float32)
         found = MapFile(values, "floats") if array.dtype.kind == "f" else _map_of_integers(values, array)
         return replace(found, name=name)
+    other = read_other_map(path)
+    if other is not None:
+        return MapFile(other.values, "floats", name=other.name)
+    try:
+        _ = open_picture(path).header
+    except InputError as error:
+        raise map_fault(path, error) from error
     return read_map_picture(PictureSource(path))
 
 
 def read_map_size(path: Path) -> ImageSize:
-    """Return (height, width) of a map; only an NPZ archive is read for it."""
+    """Return (height, width) of a map; only an NPZ archive and maps of other programs are read for it."""
     kind = path.suffix.lower()
     if kind == ".pfm":
         return read_pfm_size(path)
-    return image_size(_read_numpy(path)[0]) if kind in (".npy", ".npz") else source_size(PictureSource(path))
+    if kind in (".npy", ".npz"):
+        return image_size(_read_numpy(path)[0])
+    other = read_other_map(path)
+    return source_size(PictureSource(path)) if other is None else image_size(other.values)
 
 
 def read_map_picture(source: PictureSource) -> MapFile:
@@ -144,9 +155,16 @@ def _map_of_integers(values: FloatImage, stored: NDArray[Any], largest: float = 
 
 
 def _map_of_colors(path: Path, pixels: NDArray[Any]) -> MapFile:
-    found = values_of_colors(pixels) if pixels.dtype.kind == "u" else None
+    try:
+        found = values_of_colors(pixels) if pixels.dtype.kind == "u" else None
+    except CyclicColorsError as error:
+        words = "shows depth in a circle of hues (HSV), in which near and far look alike"
+        raise InputError(f"{path}: {words}; save it as grey, or in the colours of turbo") from error
     if found is None:
-        raise InputError(f"{path}: is a colour picture; a depth map has one value per pixel: save it as grey")
+        raise InputError(
+            f"{path}: is a colour picture; a depth map has one value per pixel: save it as grey, as NPY, or in the"
+            " colours of turbo, jet, inferno or viridis"
+        )
     values, name = found
     note = f"{path.name} shows depth in the colours of {name}: they were read back. A grey or float map is more exact."
     return MapFile(values, "colours", notes=(note,))

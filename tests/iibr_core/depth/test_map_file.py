@@ -202,6 +202,21 @@ def test_maps_drawn_in_colours_are_read_back(tmp_path, scale) -> None:
         opened(tmp_path, "photo.jpg")
 
 
+def test_black_in_a_coloured_map_is_unknown_and_a_circle_of_hues_is_refused(tmp_path) -> None:
+    grey = np.array(integers(scene()[1], np.uint8))
+    for name, jet in (("a.png", "JET"), ("a.jpg", "TURBO")):
+        colors = cv2.applyColorMap(grey, getattr(cv2, f"COLORMAP_{jet}"))
+        colors[holes()] = 0
+        cv2.imwrite(str(tmp_path / name), colors)
+        found = opened(tmp_path, name)
+        assert_true_to_scene(found)
+        assert found.disparity.unknown[holes()].mean() > 0.95
+    hues = np.dstack([grey, *[np.full_like(grey, 255)] * 2])
+    Image.fromarray(hues, "HSV").convert("RGB").save(tmp_path / "hsv.png")
+    with pytest.raises(InputError, match=r"circle of hues .*; save it as grey"):
+        opened(tmp_path, "hsv.png")
+
+
 def test_a_squashed_map_is_refused_with_the_way_out(tmp_path) -> None:
     integers(scene()[1], np.uint8).resize((112, 112)).save(tmp_path / "map.png")
     with pytest.raises(InputError, match=r"112x112 .* 240x160; crop or rotate it"):

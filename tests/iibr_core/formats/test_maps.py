@@ -1,3 +1,4 @@
+import re
 import struct
 
 import numpy as np
@@ -10,7 +11,7 @@ from PIL import Image
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import read_pfm, write_pfm
-from iibr_core.formats.maps.reader import read_map, read_map_file
+from iibr_core.formats.maps.reader import read_map, read_map_file, read_map_size
 from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
 from iibr_core.formats.maps.writer import MAX_PNG_VALUE, write_map
 from iibr_core.types import FloatImage, ImageSize, InputError
@@ -133,6 +134,55 @@ def test_every_known_value_of_a_sparse_map_counts(tmp_path, size) -> None:
     assert found.values.min() == pytest.approx(2 * ratio)
     assert found.values.max() == pytest.approx(5 * ratio)
     assert sum("was filled" in note for note in found.notes) == 1
+
+
+SIZE_BYTES = struct.pack("<ii", 8, 6)
+OTHER_MAPS = {
+    "a.jpg.geometric.bin": (b"8&6&1&", 1),
+    "a.dpt": (struct.pack("<f", 202021.25) + SIZE_BYTES, 1),
+    "a.flo": (b"PIEH" + SIZE_BYTES, 2),
+    "a.dmb": (struct.pack("<4i", 1, 6, 8, 1), 1),
+}
+"""Header and number of channels by the name of a map of another program."""
+
+
+@pytest.mark.parametrize("name", OTHER_MAPS)
+def test_maps_of_other_programs(tmp_path, name) -> None:
+    header, channels = OTHER_MAPS[name]
+    values = np.random.default_rng(0).uniform(1, 9, (6, 8)).astype("<f4")
+    stored = np.dstack([-values, 0 * values]) if channels == 2 else values
+    (tmp_path / name).write_bytes(header + stored.tobytes())
+    found = read_map_file(tmp_path / name)
+    np.testing.assert_array_equal(found.values, values)
+    assert found.name == ("disparity" if channels == 2 else "depth")
+    assert read_map_size(tmp_path / name) == (6, 8)
+    (tmp_path / name).write_bytes(header + stored.tobytes()[:-50])
+    with pytest.raises(InputError, match=re.escape(name)):
+        read_map_file(tmp_path / name)
+
+
+def test_maps_of_record3d(tmp_path) -> None:
+    lzfse = pytest.importorskip("lzfse", reason="the extra record3d is not installed")
+    values = np.random.default_rng(0).uniform(1, 9, (256, 192)).astype("<f4")
+    (tmp_path / "0.depth").write_bytes(lzfse.compress(values.tobytes()))
+    np.testing.assert_array_equal(read_map_file(tmp_path / "0.depth").values, values)
+    (tmp_path / "metadata").write_text('{"h": 960, "dw": 256, "dh": 192}')
+    assert read_map_file(tmp_path / "0.depth").values.shape == (192, 256)
+    (tmp_path / "0.depth").write_bytes(b"bvx2" + bytes(500))
+    with pytest.raises(InputError, match="16-bit PNG"):
+        read_map_file(tmp_path / "0.depth")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"MATLAB 5.0 MAT-file", "MATLAB"), (b"\x89HDF\r\n\x1a\n" + bytes(90), "HDF5"), (bytes(90), "of no known kind"),
+     (b"%PDF-1.7", "PDF"), (b"\x89PNG\r\n\x1a\n" + bytes(90), "cannot be read as a map")],
+)  # fmt: skip
+def test_files_that_are_no_maps_are_to_be_saved_as_maps(tmp_path, content, words) -> None:
+    (tmp_path / "a.map").write_bytes(content)
+    with pytest.raises(InputError, match=f"{words}.*; save it as NPY, PFM or a 16-bit PNG") as error:
+        read_map_file(tmp_path / "a.map")
+    assert "JPEG" not in str(error.value)
 
 
 def some_map() -> np.ndarray:

@@ -9,12 +9,13 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
+from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.scenes.lens_limits import focus_limits
-from iibr_core.scenes.light_fields import FROM_VIEWS
+from iibr_core.scenes.light_fields import FROM_VIEWS, open_settled
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
 from tests.viewer.conftest import reduce
 from viewer.model import lens, opening
@@ -43,6 +44,41 @@ def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path) -> None:
     ((ready, views),) = showings(results_of(request, lambda: CENTRE))
     assert ready.scene.has_view_disparity
     assert {view.view.is_final for view in views} == {True}
+
+
+def test_found_disparity_is_kept_for_the_next_time_until_a_view_changes(tmp_path, monkeypatch) -> None:
+    """Then only the views that are wanted are read; names count from right to left, as parallax shows."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder = write_two_planes(tmp_path / "field")
+    for row, column in np.ndindex(5, 5):
+        (folder / "views" / f"v{row}_u{column}.png").rename(folder / f"v{row}_u{4 - column}.png")
+    (folder / "views").rmdir()
+    request = SceneRequest(1, Source(str(folder)), takes_drafts=False)
+    ((first, _),) = showings(results_of(request, lambda: CENTRE))
+    monkeypatch.setattr("iibr_core.scenes.light_fields.settle", None)
+    ((again, views),) = showings(results_of(request, lambda: CENTRE, lambda: {ViewOffset(0.0, 1.0)}))
+    assert again.scene == first.scene
+    assert np.array_equal(again.centre.disparity, first.centre.disparity)
+    assert [(view.view.row, view.view.column) for view in views] == [(2, 2), (2, 3)]
+    assert views[-1].view.disparity[48, 47] == pytest.approx(SQUARE_PX, abs=0.1)
+    (folder / "v0_u0.png").touch()
+    with pytest.raises(TypeError):
+        list(results_of(request, lambda: CENTRE))
+
+
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_a_field_that_does_not_fit_is_thinned(tmp_path, monkeypatch, is_asked) -> None:
+    folder, grid = write_two_planes(tmp_path / "field"), GridShape(3, 3)
+    if not is_asked:
+        monkeypatch.setattr("iibr_core.scenes.light_fields.MAX_PIXELS", 10 * 96 * 96)
+    source = Source(str(folder), arrangement=Arrangement(grid=grid) if is_asked else UNKNOWN)
+    ((ready, views),) = showings(results_of(SceneRequest(1, source, takes_drafts=False), lambda: CENTRE))
+    assert (ready.scene.grid, len(views)) == (grid, 9)
+    assert ready.scene.disparity_range_px == pytest.approx((2 * WALL_PX, 2 * SQUARE_PX), abs=0.3)
+    assert "One of every 2 rows and columns of views is used: 3x3 of 5x5." in ready.scene.notes
+    field, notes = open_settled(source)
+    assert (field.grid, field.layout) == (grid, "grid folder, 3x3 of 5x5")
+    assert notes[0] == ready.scene.notes[0]
 
 
 def test_the_centre_views_disparity_may_be_given(tmp_path) -> None:

@@ -17,7 +17,7 @@ from tests.viewer.cli.conftest import Iibr, contents, output_of, refusal_of
 ROOT = Path(__file__).parents[3]
 EXTRAS = (
     "torch", "transformers", "scipy", "skimage", "jinja2", "flip_evaluator", "matplotlib", "cv2", "distributed", "av",
-    "pillow_heif",
+    "pillow_heif", "lzfse",
 )  # fmt: skip
 
 

@@ -96,7 +96,7 @@ def test_notes_come_after_the_result_and_not_with_an_error(
     words = ("generate", photo_path, "--grid", 3, "--depth", "rough", "--refine", "off", "-o", tmp_path / "field")
     with monkeypatch.context() as small:
         small.setattr("iibr_core.method.memory.free_memory_bytes", lambda: 10**5)
-        assert refusal_of(iibr(*words)).endswith("lower --grid or --max-pixels")
+        assert refusal_of(iibr(*words)).endswith("lower --grid, or --max-pixels for a photo")
     done = iibr(*words)
     output_of(done)
     assert all(line.startswith("note: ") for line in done.stderr.splitlines())
