@@ -135,7 +135,7 @@ class SceneView:
         if self._is_preview:
             self._open_field(scene, self._gloss)
             self.renderer.upload_view(*scene.grid.centre, centre.colors, centre.disparity)
-            self._is_preview = False
+            self._is_preview, self._final_seen = False, 0  # what was drawn of the picture went with its field
         self._waiting.append(view)
         self._keep_for_picking(scene, view)
 
@@ -182,7 +182,7 @@ class SceneView:
         optics, drawn, budget_s = state.shown_optics, self.picture_drawn, self._gl.frame_budget_s
         picture = Picture(self.generation, self.views_uploaded, optics, size_px, previews=self.previews, part=part)
         if drawn is not None and drawn == replace(picture, views_uploaded=drawn.views_uploaded, samples=drawn.samples):
-            is_making, is_soft = state.is_making_views, not self.renderer.passes_shown
+            is_making, is_soft = state.is_making_views, self._is_soft
             is_soon = time.perf_counter() - self._drawn_at < VIEW_REFRESH_S
             if is_soon and is_making and not is_soft:
                 return drawn  # the processor is needed for views
@@ -207,9 +207,17 @@ class SceneView:
     @property
     def report(self) -> DrawReport:
         """The report on the last picture."""
-        renderer, is_sketch = self.renderer, self._scene is not None and self._scene.is_sketch
-        is_draft = is_sketch or not renderer.passes_shown
+        renderer, drawn = self.renderer, self.picture_drawn
+        is_sketch = self._scene is not None and self._scene.is_sketch
+        is_lens_coarse = drawn is not None and drawn.optics.aperture_diameter > 0 and self._is_soft
+        is_draft = is_sketch or is_lens_coarse or not renderer.passes_shown
         return DrawReport(renderer.samples, renderer.samples_converged, 1e3 * renderer.draw_s, is_draft)
+
+    @property
+    def _is_soft(self) -> bool:
+        """Whether the picture on the screen can still become visibly finer."""
+        renderer = self.renderer
+        return renderer.passes_shown < FINE_PASSES and not (renderer.is_renewing or renderer.is_converged)
 
     def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
         """Draw the picture with all its samples, however long that takes; return its record as `draw` does."""
