@@ -62,7 +62,14 @@ def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: Offscr
     viewer.do(do(depth.set_brush, Brush(radius=0.1, is_on=True)))
     changed = differs(before, viewer.screen(SIZE))
     assert changed[PANEL].sum() > 500
-    assert changed[PICTURE].sum() > 100
+    before = viewer.screen(SIZE)
+    viewer.do(do(depth.set_brush, replace(viewer.state.brush, radius=0.15)))
+    changed = differs(before, viewer.screen(SIZE))
+    ring, picture = np.argwhere(changed[PICTURE]), layout_for(viewer.state, ScreenSize(*SIZE), 1.0, 1.0).picture
+    assert picture is not None
+    middle = picture.y + picture.height / 2, picture.x + picture.width / 2
+    np.testing.assert_allclose((ring.min(axis=0) + ring.max(axis=0)) / 2, middle, atol=3)
+    np.testing.assert_allclose(np.ptp(ring, axis=0), 2 * 0.15 * picture.width, atol=4)
 
 
 @pytest.mark.parametrize("eye", [CENTRE, ViewOffset(0.6, -0.8)])

@@ -11,7 +11,8 @@ import pytest
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
+from tests.viewer.conftest import HEIGHT, NEAR, WIDTH, headless_with_scene
+from viewer.display.inspection_view import MASK_COLORS
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import inspection, lens, messages
 from viewer.model.action import Action, do
@@ -72,6 +73,7 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Offscree
 def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: OffscreenScene, kind: OverlayKind) -> None:
     viewer.do(do(lens.move_eye, ViewOffset(0, 1)))
     picture = layout_now(viewer).picture
+    assert picture is not None
     plain = part(viewer.screen(SIZE), picture).astype(int)
     viewer.do(do(inspection.set_overlay, kind), do(inspection.set_opacity, 0.0))
     clear = part(viewer.screen(SIZE), picture).astype(int)
@@ -83,6 +85,11 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: Offscreen
     assert differs.sum() > 3 * ENOUGH_PIXELS
     if kind == "inpainted":
         assert differs.mean() < 0.3, "only what the photo does not show"
+        amber = (np.abs(covered - MASK_COLORS["inpainted"]).max(axis=2) < 24)[below_legend]
+        assert amber.sum() > 0.9 * differs.sum()
+        columns, scale = np.flatnonzero(amber.sum(axis=0) > 20), picture.width / WIDTH
+        edge = (2 * WIDTH / 3 - NEAR) * scale  # the near square moves to the left, and shows what is behind its right
+        assert edge - 2 < columns.min() <= columns.max() < edge + 4 * scale
 
 
 @pytest.mark.parametrize(("is_guessed", "rows"), [(False, np.s_[:40]), (True, np.s_[36:76])])
