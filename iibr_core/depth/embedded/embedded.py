@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
+
+import numpy as np
 
 from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
 from iibr_core.depth.embedded.google import (
@@ -37,9 +40,11 @@ from iibr_core.formats.images.lfp import read_lfp_depth
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture import upright
+from iibr_core.formats.images.record3d import read_recording
 from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, read_lif
 from iibr_core.formats.images.xmp import parse_packet
 from iibr_core.formats.maps.disparity_file import has_shape_of
+from iibr_core.formats.maps.other_maps import depth_of_lzfse
 from iibr_core.types import ImageSize, InputError, Photo, image_size
 
 MAX_FILE_BYTES = 512 * 2**20
@@ -271,5 +276,19 @@ def _in_packet(path: Path) -> EmbeddedDepth | None:
     return None if estimate is None else EmbeddedDepth(estimate, GDEPTH, all_in_focus(xmp), range_notes(xmp))
 
 
-READERS: dict[Kind, Callable[[Path], EmbeddedDepth | None]] = {"AVIF": _in_avif, "HEIC": _in_heic, "Lytro": _in_lfp}
+def _in_recording(path: Path) -> EmbeddedDepth:
+    recording = read_recording(path)
+    distances = depth_of_lzfse(recording.distances, str(path))
+    if distances.size != math.prod(recording.size):
+        raise InputError(f"{path}: its map holds {distances.size:,} distances, not {recording.size}")
+    known = np.where(distances > 0, distances, np.float32(np.nan)).reshape(recording.size)
+    return EmbeddedDepth(DepthEstimate(known, "metres"), "Record3D")
+
+
+READERS: dict[Kind, Callable[[Path], EmbeddedDepth | None]] = {
+    "AVIF": _in_avif,
+    "HEIC": _in_heic,
+    "Lytro": _in_lfp,
+    "Record3D": _in_recording,
+}
 """Functions that return the depth within a kind of files, None without."""

@@ -18,7 +18,7 @@ RAW_STARTS = re.compile(
 )
 TIFF_STARTS = (b"II*\0", b"MM\0*")
 AVIF_BRANDS = frozenset({b"avif", b"avis"})
-Kind = Literal["HEIC", "AVIF", "Lytro", "RAW", "JPEG", "other"]
+Kind = Literal["HEIC", "AVIF", "Lytro", "Record3D", "RAW", "JPEG", "other"]
 """Kinds of pictures that are read in different ways. Lytro: its raw files, too."""
 
 
@@ -78,6 +78,7 @@ SNIFFERS: tuple[tuple[Kind, Callable[[bytes, str], bool]], ...] = (
     ("HEIC", _begins(rb".{4}ftyp(?:hei[cxms]|hev[cx]|mif1|msf1)")),
     ("Lytro", _begins(rb"\x89LFP\r\n\x1a\n")),
     ("AVIF", _is_avif),
+    ("Record3D", lambda start, ending: ending.lower() == ".r3d" and start.startswith(b"PK")),
     ("RAW", _is_raw),
     ("JPEG", _begins(rb"\xff\xd8\xff")),
 )

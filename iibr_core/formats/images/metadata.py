@@ -16,6 +16,7 @@ from PIL import Image
 from iibr_core.formats.images.file_kinds import Kind
 from iibr_core.formats.images.heic import heic_info
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, EXIF_FOLDER, ORIENTATION_TAG, exif_of
+from iibr_core.formats.images.record3d import read_recording
 from iibr_core.formats.images.xmp import NAMESPACES, list_value_in, parse_packet
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
 
@@ -72,6 +73,8 @@ class Caption:
 def metadata_in(path: Path, kind: Kind) -> PictureMetadata:
     """Return the metadata of a file; nothing where it is damaged."""
     try:
+        if kind == "Record3D":
+            return PictureMetadata(pictures=read_recording(path).frames)
         if kind == "HEIC":
             info = heic_info(path)
             return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))

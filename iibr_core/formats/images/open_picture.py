@@ -16,6 +16,7 @@ from iibr_core.formats.images.heic import heic_size, read_heic
 from iibr_core.formats.images.lfp import lfp_size, read_lfp
 from iibr_core.formats.images.metadata import SETTINGS_KEY, PictureMetadata, metadata_in
 from iibr_core.formats.images.picture import Picture
+from iibr_core.formats.images.record3d import decode_recording, recording_header
 from iibr_core.formats.images.xmp import text_in, unpack
 from iibr_core.types import ImageSize, InputError
 
@@ -37,6 +38,7 @@ def _refuse_raw(path: Path, number: int) -> Header:
 READERS: dict[Kind, Reader] = {
     "HEIC": Reader(lambda path, number: Header(heic_size(path, number)), read_heic),  # libheif turns it upright
     "Lytro": Reader(lambda path, number: Header(lfp_size(path)), lambda path, number: read_lfp(path)),
+    "Record3D": Reader(recording_header, decode_recording),
     "AVIF": Reader(pillow_header, decode_avif),
     "RAW": Reader(_refuse_raw, decode_other),
     "JPEG": Reader(oiio_header, decode_other),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, open_binary, read_text, reason_of
 from iibr_core.formats.images.file_kinds import unreadable_kind
+from iibr_core.runtime.extras import how_to_install
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 START_BYTES = 64
@@ -83,7 +84,7 @@ def depth_of_lzfse(data: bytes, name: str) -> FloatImage:
     try:
         import lzfse
     except ImportError as error:
-        raise InputError(f"{name}: is compressed by LZFSE: install the package lzfse, or {WAY_OUT}") from error
+        raise InputError(f"{name}: is compressed by LZFSE; {how_to_install('record3d')}, or {WAY_OUT}") from error
     try:
         return np.frombuffer(lzfse.decompress(data), "<f4")
     except (*PARSE_ERRORS, lzfse.error) as error:

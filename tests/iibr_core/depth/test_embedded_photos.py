@@ -1,5 +1,7 @@
 import base64
 import io
+import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -201,6 +203,29 @@ def test_a_channel_of_depth_in_jpeg_xl_is_named(tmp_path) -> None:
     for start, has_depth in ((codestream, True), (codestream[:5], False), (data[:40], False)):
         (tmp_path / "b.jxl").write_bytes(start)
         assert has_depth_channel(tmp_path / "b.jxl") is has_depth
+
+
+# ---- Record3D
+
+
+def test_the_first_frame_of_a_recording(tmp_path) -> None:
+    lzfse = pytest.importorskip("lzfse", reason="the extra record3d is not installed")
+    metres = 1 / (0.1 + SMALL / np.float32(255))
+    stated = {"w": 128, "h": 96, "dw": 64, "dh": 48, "K": [100, 0, 0, 0, 100, 0, 64, 48, 1], "poses": []}
+    with zipfile.ZipFile(tmp_path / "a.r3d", "w") as archive:
+        archive.writestr("metadata", json.dumps(stated))
+        for number, photo in ((10, files.grey_photo((96, 128))), (2, PHOTO)):
+            archive.writestr(f"rgbd/{number}.jpg", photo)
+            archive.writestr(f"rgbd/{number}.depth", lzfse.compress(metres.astype("<f4").tobytes()))
+    found = open_with_depth(tmp_path / "a.r3d")
+    assert_disc_is_nearest(found)
+    assert found.photo.focal_px == pytest.approx(100)
+    slope, offset = found.disparity.inverse_metres
+    assert slope * found.disparity.values[60, 60] + offset == pytest.approx(0.1 + 230 / 255, rel=0.02)
+    assert any("first of its 2 pictures" in note for note in found.photo.notes)
+    (tmp_path / "b.r3d").write_bytes((tmp_path / "a.r3d").read_bytes()[:500])
+    with pytest.raises(InputError, match=r"b\.r3d: is no recording of Record3D, or damaged"):
+        read_photo(tmp_path / "b.r3d")
 
 
 # ---- Lytro
