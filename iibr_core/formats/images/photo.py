@@ -21,6 +21,7 @@ from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, small_picture, source_size
 from iibr_core.formats.images.side_by_side import left_picture
+from iibr_core.formats.images.tiles import tile_note
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo, image_size
@@ -46,7 +47,7 @@ def read_photo(
     missing, no picture, cut off, or absurdly large.
     """
     photo = read_picture(left_picture(Path(path)), max_pixels, fov_deg, keeps_primaries)
-    return replace(photo, notes=photo.notes + file_notes(Path(path)))
+    return replace(photo, notes=photo.notes + file_notes(Path(path)) + tile_note(photo.pixels))
 
 
 def read_picture(

@@ -24,7 +24,7 @@ from iibr_core.formats.quilts import MAX_USUAL_SIDE_PX, Quilt, lay_out, quilt_fo
 from iibr_core.scenes.light_fields import find_disparity
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
-from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
+from tests.iibr_core.known_scenes import FOREGROUND, view_of_square, view_of_wall
 
 HEIGHT, WIDTH = 6, 9
 RNG = np.random.default_rng(0)
@@ -330,3 +330,13 @@ def test_two_pictures_of_one_scene_are_a_pair_under_any_names(tmp_path) -> None:
     found = open_with_depth(folder / "a.png", DepthChoice(right=str(folder / "b.png")))
     assert found.origin.words == "the photo's two views (stereo, two files)"
     assert np.median(found.disparity.values[16:24, 20:28]) == pytest.approx(2 * FOREGROUND, abs=0.6)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(6, 8), (3, 3), (1, 7)])
+def test_a_photo_that_looks_like_tiles_of_one_scene_says_so(tmp_path, rows, columns) -> None:
+    tiles = [[view_of_wall(ViewOffset(r, c), 0.5) for c in range(columns)] for r in range(rows)]
+    mosaic = np.vstack([np.hstack(row) for row in tiles])
+    Image.fromarray((mosaic * 255).astype(np.uint8)).save(tmp_path / "mosaic.png")
+    assert f"let its name end in _qs{columns}x{rows}." in read_photo(tmp_path / "mosaic.png").notes[-1]
+    Image.fromarray((view_of_wall(ViewOffset(0, 0), size=(60, 80)) * 255).astype(np.uint8)).save(tmp_path / "one.png")
+    assert read_photo(tmp_path / "one.png").notes == ()
