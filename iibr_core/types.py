@@ -89,6 +89,11 @@ class GridShape(NamedTuple):
         v, u = self.centre
         return ViewOffset(float(row - v), float(column - u))
 
+    def index_of(self, offset: ViewOffset) -> tuple[int, int]:
+        """Return the index (row, column) of the view nearest to an offset."""
+        v, u = self.centre
+        return v + round(offset.t), u + round(offset.s)
+
 
 def image_size(pixels: NDArray[Any]) -> ImageSize:
     """Return the size of an image (H, W, ...)."""

@@ -1,9 +1,8 @@
 #version 330 core
-// The picture: the mean, in linear light, of what pinhole cameras spread over the aperture see, sheared to the focus.
-// Each camera is answered by one stored view, warped by that view's own disparity. A pinhole is a lens with one camera,
-// which up to four views answer.
+// The picture of a pinhole camera, which up to four stored views answer, each warped by its own disparity. Views without
+// disparity give the picture of an open lens, too: their mean, in linear light, sheared to the focus.
 // WARP: some views have disparity. NEAR: all answering views are near their cameras. DOLLY: the rays of different pixels
-// cross the grid at different places.
+// cross the grid at different places. SEEN: disparity in place of light.
 #include "first_hit.glsl"
 #include "gloss.glsl"
 
@@ -17,15 +16,10 @@ layout(std140) uniform Samples {
 };
 uniform int sample_count;
 uniform vec4 field_part;      // of the picture that the views show: left, top, width, height
-uniform float cell_views;     // side of the square of the aperture that a camera stands for, view steps
 uniform vec2 pixel_uv;        // size of a pixel, texture coordinates of the views
 #ifdef DOLLY
 uniform sampler2D nearest_views;  // by place in the grid: nearest view's (column, row); z: 1 = has disparity; w: layer
 uniform vec2 eye_in_grid;         // (column, row), real
-#endif
-#ifdef CAT_EYE
-uniform vec3 barrel;          // xy: how far its opening moves across the picture, view steps; z: radius
-uniform float barrel_edge;    // view steps over which it closes
 #endif
 
 in vec2 uv;
@@ -42,7 +36,7 @@ struct Answer {
 Answer answer_of(int i) {
 #ifdef DOLLY
     // A corner of the cell that this pixel's ray crosses: by thresholds, or each corner with its bilinear weight.
-    vec2 last = vec2(textureSize(nearest_views, 0) - 1), wanted = eye_in_grid + dolly * (uv - 0.5) + cameras[i].xy;
+    vec2 last = vec2(textureSize(nearest_views, 0) - 1), wanted = eye_in_grid + dolly * (mirrored(uv) - 0.5) + cameras[i].xy;
     vec2 inside = clamp(wanted, vec2(0.0), last), cell = min(floor(inside), max(last - 1.0, 0.0)), f = inside - cell;
     bool is_blend = answers[i].z > 0.5;
     vec2 corner = is_blend ? answers[i].xy : step(answers[i].xy, f), share = mix(1.0 - f, f, corner);
@@ -56,8 +50,8 @@ Answer answer_of(int i) {
 
 // The surface that camera i sees. Each camera searches it at another place of the pixel, which makes edges smooth; the
 // colour is read at the pixel's middle, which blurs nothing else.
-Surface surface_seen(int i, Answer answer, float focus) {
-    vec2 in_view = (uv - field_part.xy) / field_part.zw;
+Surface surface_seen(int i, Answer answer, float focus, vec2 place) {
+    vec2 in_view = (place - field_part.xy) / field_part.zw;
     vec2 camera = cameras[i].xy * view_step / view_size_px, to_view = answer.to_view * view_step / view_size_px;
     Ray ray = Ray(in_view, camera, to_view, answer.layer, focus);
 #ifdef WARP
@@ -75,31 +69,27 @@ Surface surface_seen(int i, Answer answer, float focus) {
     return Surface(focus, place_at(ray, focus), false);
 }
 
-// The share of a camera that the lens barrel lets through.
-float barrel_share(vec2 camera) {
-#ifdef CAT_EYE
-    return clamp(0.5 + (barrel.z - length(camera - barrel.xy * (uv - 0.5))) / barrel_edge, 1e-6, 1.0);
-#else
-    return 1.0;
-#endif
-}
-
 void main() {
-    float focus = focus_at(uv);
+    // Around the picture lies its mirror image.
+    vec2 place = mirrored(uv);
+    float focus = focus_at(place);
     sum = vec4(0.0);
     // There is at least one camera: a loop that tests first costs software GL one more turn.
     int i = 0;
     do {
         Answer answer = answer_of(i);
-        Surface seen = surface_seen(i, answer, focus);
-        float beside = max(abs(seen.disparity - focus) - focus_range, 0.0);
-        vec4 light = light_at(seen.at, answer.layer, cell_views * beside);
+        Surface seen = surface_seen(i, answer, focus, place);
+#ifdef SEEN
+        sum = vec4(seen.disparity);
+#else
+        vec4 light = light_at(seen.at, answer.layer);
 #ifdef GLOSS
-        vec2 ray = eye + dolly * (uv - 0.5) + cameras[i].xy;
+        vec2 ray = eye + dolly * (place - 0.5) + cameras[i].xy;
         light.rgb = glossy(light.rgb, seen.at, ray + answer.to_view, light.a, ray);
 #endif
         // A view that does not see the surface counts only where no other does.
         float known = in_picture(seen.at) * (seen.is_hidden ? 1e-3 : 1.0);
-        sum += answer.weight * known * barrel_share(cameras[i].xy) * vec4(light.rgb, 1.0);
+        sum += answer.weight * known * vec4(light.rgb, 1.0);
+#endif
     } while (++i < sample_count);
 }

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iibr_core.beyond.hidden_surfaces import HiddenSurface
 from iibr_core.method.rays import RaySet, rays_of_photo
 from iibr_core.method.view import Renderer, View, finish
 from iibr_core.runtime.tiling import THREADS
@@ -76,16 +77,23 @@ class LargePhoto:
 
     pixels: (H, W, 3), sRGB-encoded. disparity: (H, W), px of this size per view step. fills: complete ray set of a
     light field of the scene, of any size, for inpainted content and for the photo's continuation beyond its frame.
+    hidden: the surface behind the photo's, of the light field's size, for open lenses.
     """
 
     pixels: FloatImage
     disparity: FloatImage
     fills: RaySet | None = None
+    hidden: HiddenSurface | None = None
 
     @property
     def size(self) -> ImageSize:
         """Height and width of the photo."""
         return image_size(self.disparity)
+
+    @cached_property
+    def range_px(self) -> FloatImage:
+        """Least and greatest disparity (2,), px of the photo per view step."""
+        return np.array([self.disparity.min(initial=0.0), self.disparity.max(initial=0.0)], np.float32)
 
     @cached_property
     def greatest_disparity(self) -> float:

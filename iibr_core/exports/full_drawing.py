@@ -20,20 +20,16 @@ from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.exports.source import Draw
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped, report_progress
-from iibr_core.scenes.large_photo import complete_fills, load_large
+from iibr_core.scenes.large_photo import complete_fills, hidden_of_photo, load_large
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset, ViewUpdate
+from iibr_core.types import FloatImage, ImageSize, ViewUpdate
 
 TILE_PX = 768
 """Side of a tile in pixels of the photo, without the margin of its views."""
-MARGIN_PX = 4
-"""Margin of a tile's views beside parallax, in pixels, for the kernels."""
-PARALLAX_PX = (1.5, 16.0)
-"""Parallax within a tile from the eye to the border of the aperture, in pixels of the photo, above which the tile needs
-views at the border, and above which it needs views half-way, too.
-"""
+MARGIN_PX, REDUCTION_SHARE = 16, 0.25
+"""Margin of a tile beside its widest disc: in pixels, and as a share of the disc, which is drawn at a reduced size."""
 DRAWING = "drawing at the photo's own size"
 
 
@@ -65,9 +61,12 @@ def _read_photo(picture: FullPicture, photo: LargePhoto | None, keep: Callable[[
     if photo is None:
         photo = load_large(source, loaded, plan, MAX_PIXELS)
         keep(photo)
-    if photo.fills is None and (optics.eye != CENTRE or optics.aperture_diameter > 0):
+    is_open = optics.aperture_diameter > 0 and photo.hidden is None
+    if photo.fills is None and (optics.eye != CENTRE or is_open):
         photo = replace(photo, fills=complete_fills(source, loaded, plan))
-        keep(photo)
+    if is_open:
+        photo = replace(photo, hidden=hidden_of_photo(loaded, plan, picture.scene, photo.fills))
+    keep(photo)
     return photo
 
 
@@ -90,40 +89,38 @@ def _draw_tiles(picture: FullPicture, photo: LargePhoto, draw: Draw) -> FloatIma
 
 
 def _tile_settings(picture: FullPicture, photo: LargePhoto, tile: Part, renderer: Renderer) -> RenderSettings:
-    """Return the settings of a tile, with the views around the eye that its lens needs."""
+    """Return the settings of a tile, with the eye's view of it and what its discs reach."""
     scene, eye = picture.scene, picture.optics.eye
-    optics = picture.optics.with_focus_scaled(photo.size.width / scene.width)
-    diameter = min(max(optics.aperture_diameter, 0.0), float(max(scene.grid)))
-    rings, margin_px = _rings_of(photo, tile, optics, diameter / 2)
-    step = diameter / 2 / rings if rings else max(diameter / 2, 1.0)
-    around = tile.grown(min(margin_px, max(photo.size)), whole(photo.size))
-    grid = GridShape(2 * rings + 1, 2 * rings + 1)
-    places = list(np.ndindex(*grid))
-    offsets = [ViewOffset(eye.t + step * (row - rings), eye.s + step * (column - rings)) for row, column in places]
-    views = tuple(
-        ViewUpdate(row, column, stored_from_encoded(view.colors, True), view.disparity * np.float32(step))
-        for (row, column), view in zip(places, views_of_tile(photo, around, offsets, renderer))
-    )
-    gain = picture.optics.highlight_gain(picture.optics.aperture_diameter, scene.is_hdr)
+    enlarged = photo.size.width / scene.width
+    optics = picture.optics.with_focus_scaled(enlarged)
+    around = tile.grown(min(MARGIN_PX + _reach_px(photo, optics), max(photo.size)), whole(photo.size))
+    if eye == CENTRE:
+        colors, disparity = photo.pixels[around.slices], photo.disparity[around.slices]
+    else:
+        view = next(views_of_tile(photo, around, [eye], renderer))
+        colors, disparity = view.colors, view.disparity
     return RenderSettings(
-        replace(optics.with_focus_scaled(step), eye=CENTRE, aperture_diameter=diameter / step),
+        replace(optics, eye=CENTRE),
         ScreenSize(tile.size.width, tile.size.height),
         _share_of(tile, photo.size),
         is_linear=True,
         color_space=scene.color_space,
-        tile=LensTile(_share_of(around, photo.size), grid, views, gain),
+        tile=LensTile(
+            _share_of(around, photo.size),
+            ViewUpdate(0, 0, stored_from_encoded(colors, True), disparity),
+            picture.optics.highlight_gain(picture.optics.aperture_diameter, scene.is_hdr),
+            photo.hidden,
+            enlarged,
+            (eye.s, eye.t),
+        ),
     )
 
 
-def _rings_of(photo: LargePhoto, tile: Part, optics: Optics, radius: float) -> tuple[int, int]:
-    """Return the rings of views around the eye for a lens of this radius (view steps), and their margin in pixels."""
-    farthest = photo.greatest_disparity
-    steepest = abs(optics.focus_disparity) + sum(map(abs, optics.focus_tilt)) + max(optics.focus_range, 0.0)
-    margin_px = MARGIN_PX + math.ceil(min(radius * (steepest + 1.5 * farthest), max(photo.size)))
-    moved_px = math.ceil(min(max(map(abs, optics.eye)) * farthest, max(photo.size)))
-    seen = photo.disparity[tile.grown(margin_px + moved_px, whole(photo.size)).slices]
-    parallax_px = radius * float(seen.max() - seen.min())
-    return sum(parallax_px > limit for limit in PARALLAX_PX), margin_px
+def _reach_px(photo: LargePhoto, optics: Optics) -> int:
+    """Return the radius of the widest disc in pixels of the photo."""
+    beside = np.abs(photo.range_px - np.float32(optics.focus_disparity)).max() + sum(map(abs, optics.focus_tilt))
+    diameter = max(optics.aperture_diameter, 0.0) * (2**0.5 if optics.aperture_shape.kind == "mask" else 1.0)
+    return math.ceil(min(diameter / 2 * float(beside), max(photo.size)) * (1 + REDUCTION_SHARE))
 
 
 def _share_of(part: Part, size: ImageSize) -> Rect:

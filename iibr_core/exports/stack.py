@@ -17,13 +17,13 @@ from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 
-OPENED = 0.8
+OPENED = 0.1
 """Aperture as a share of the widest one, if an open aperture is needed and the window shows a closed one."""
 
 
 def open_diameter(scene: Scene, optics: Optics) -> float:
     """Return the diameter of the aperture in view steps, opened if it is closed."""
-    return optics.aperture_diameter or OPENED * aperture_limit(scene.grid)
+    return optics.aperture_diameter or OPENED * aperture_limit(scene)
 
 
 def focal_stack(scene: Scene, optics: Optics, count: int) -> dict[str, Optics]:

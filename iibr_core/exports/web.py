@@ -133,7 +133,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "colorSpace": "srgb" if scene.color_space == SRGB else "display-p3",
         "eyeLimits": {"t": eye_limits(scene.grid.rows), "s": eye_limits(scene.grid.columns)},
         "focusLimits": [scale * limit for limit in focus_limits(scene)],
-        "apertureLimits": [0.0, aperture_limit(scene.grid)],
+        "apertureLimits": [0.0, aperture_limit(scene)],
         "firstAperture": first_aperture(scene),
         "focus": scale * source.optics.focus_disparity,
         "aperture": source.optics.aperture_diameter,

@@ -67,6 +67,21 @@ def continue_farthest(
     _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), one_surface, 1, stages)
 
 
+def fill_behind(
+    colors: FloatImage,
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    photo_disparity: FloatImage,
+    one_surface: float,
+    threads: int = 1,
+) -> None:
+    """Fill holes of the photo (see `fill_background`) by what lies behind photo_disparity (H, W) there.
+
+    one_surface: largest difference of disparities on one surface.
+    """
+    _fill_view(colors, disparity, hole, photo_disparity, ViewOffset(0.0, 0.0), one_surface, threads, ALL_STAGES)
+
+
 def continues_in_front(
     disparity: FloatImage,
     hole: NDArray[np.bool_],

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.beyond.full_size import LargePhoto
+from iibr_core.beyond.hidden_surfaces import HiddenSurface, SeenBehind, hidden_surface
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
@@ -19,10 +20,12 @@ from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.method.light_field import view_maker
 from iibr_core.method.plan import ScenePlan
 from iibr_core.method.rays import RaySet
+from iibr_core.runtime.tiling import THREADS
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.scenes.scene import LoadedPhoto, Source
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.scene import LoadedPhoto, Scene, Source
 from iibr_core.stages import CLOSED_FORM
-from iibr_core.types import Disparity, FloatImage, InputError, Photo
+from iibr_core.types import Disparity, FloatImage, InputError, Photo, ViewOffset
 
 
 def read_large(source: Source, loaded: LoadedPhoto, max_pixels: int) -> Photo:
@@ -56,6 +59,19 @@ def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RayS
         return None
     disparity = plan.field_disparity(loaded.disparity)
     return view_maker(loaded.photo, disparity, plan, source.inpaint, stages=CLOSED_FORM).rays
+
+
+def hidden_of_photo(loaded: LoadedPhoto, plan: ScenePlan, scene: Scene, fills: RaySet | None) -> HiddenSurface:
+    """Return the surface behind the photo's, as large as a view. fills: see `complete_fills`."""
+    disparity, seen = plan.field_disparity(loaded.disparity).values, list[SeenBehind]()
+    if fills is not None:
+        rays = fills.arrays
+        for k in range(fills.photo_images, len(fills)):
+            parts = (fills.in_view(image[k]) for image in (rays.colors, rays.disparity, rays.coverage))
+            colors, values, coverage = parts
+            seen.append(SeenBehind(ViewOffset(*rays.offsets[k]), colors, values, coverage > 0))
+    radius = aperture_limit(scene) / 2
+    return hidden_surface(loaded.photo.pixels, disparity, radius, seen, THREADS)
 
 
 def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:

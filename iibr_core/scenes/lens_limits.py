@@ -13,7 +13,9 @@ Record = TypeVar("Record", Optics, ApertureShape)
 
 LONE_VIEW_MARGIN = 0.5
 """Largest distance of the viewpoint from a single row of views, in view steps."""
-FIRST_APERTURE = 0.3
+WIDEST_DISC = 0.15
+"""Diameter of the widest disc as a share of the picture's width."""
+FIRST_APERTURE = 0.1
 """Share of the widest aperture that is opened by focusing: enough to see its effect."""
 BLADES_LIMITS = (3, 11)
 STEEPEST_TILT = 4.0
@@ -63,9 +65,16 @@ def focus_span(scene: Scene) -> float:
     return high - low
 
 
-def aperture_limit(grid: GridShape) -> float:
-    """Return the widest aperture in view steps: the whole grid; 0 for a single view."""
-    return float(max(grid) if max(grid) > 1 else 0)
+def aperture_limit(scene: Scene) -> float:
+    """Return the widest aperture in view steps; 0 for a single view without depth.
+
+    Focused on the middle of the scene's disparities, it blurs the nearest and the farthest by discs of WIDEST_DISC.
+    Views without disparity allow as much as their grid.
+    """
+    grid, (far, near) = float(max(scene.grid) if max(scene.grid) > 1 else 0), scene.disparity_range_px
+    if not scene.has_view_disparity or near <= far:
+        return grid
+    return max(grid, 2 * WIDEST_DISC * scene.width / (near - far))
 
 
 def is_finite(optics: Optics) -> bool:
@@ -90,7 +99,7 @@ def clamp_optics(optics: Optics, scene: Scene) -> Optics:
         focus_disparity=clamp(optics.focus_disparity, *focus_limits(scene)),
         focus_range=clamp(optics.focus_range, 0.0, span),
         focus_tilt=(tilt_x, tilt_y),
-        aperture_diameter=clamp(optics.aperture_diameter, 0.0, aperture_limit(scene.grid)),
+        aperture_diameter=clamp(optics.aperture_diameter, 0.0, aperture_limit(scene)),
         aperture_shape=_clamp_shape(optics.aperture_shape),
     )
 
@@ -113,7 +122,7 @@ def _within_limits(record: Record) -> Record:
 
 def first_aperture(scene: Scene) -> float:
     """Return the aperture, in view steps, to which focusing opens a pinhole; 0 for a single view."""
-    return FIRST_APERTURE * aperture_limit(scene.grid)
+    return FIRST_APERTURE * aperture_limit(scene)
 
 
 @dataclass(frozen=True)

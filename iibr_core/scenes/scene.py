@@ -16,6 +16,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, Disparity, FloatImage, GridShape, ImageSize, Photo, ViewOffset, ViewUpdate
 
 if TYPE_CHECKING:
+    from iibr_core.beyond.hidden_surfaces import HiddenSurface
     from iibr_core.depth.editing.canvas import DepthCanvas
 
 AS_USUAL = DepthChoice()
@@ -243,11 +244,15 @@ class SceneReady:
 
 @dataclass(frozen=True, eq=False)
 class ViewReady:
-    """One more view of a scene, and the progress of opening it."""
+    """One more view of a scene, and the progress of opening it.
+
+    hidden: the surface behind the centre view's, once the views that show it are there.
+    """
 
     generation: int
     view: ViewUpdate
     progress: Progress
+    hidden: HiddenSurface | None = None
 
 
 def still_disparity(source: Source, before_strokes: FloatImage) -> float:

@@ -265,13 +265,15 @@ class Jobs:
             scene, optics = ready.scene, job.optics_on(ready.scene)
             if job.needs(scene, optics) == "photo":
                 return snapshot
-            wanted = views_seen_by(job.pictures(scene, optics), scene.grid)
+            wanted = views_seen_by(job.pictures(scene, optics), scene)
             for made in results:
                 assert isinstance(made, ViewReady)
                 view = made.view
                 if (view.row, view.column) != scene.grid.centre:
                     upload = partial(snapshot.field.upload, view.row, view.column, view.colors, view.disparity)
                     self._run(job, _in_one_step(upload))
+                if made.hidden is not None:
+                    self._run(job, _in_one_step(partial(snapshot.field.set_hidden, made.hidden)))
                 report_progress(made.progress.done, made.progress.total, MAKING)
         return snapshot
 

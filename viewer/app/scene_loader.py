@@ -163,6 +163,7 @@ class SceneLoader:
         if isinstance(result, SceneReady):
             return [self._open(result, state)]
         self._scene_view.add(result.view)
+        self._scene_view.take_hidden(result.hidden)
         self._inspection_view.add(result.view)
         return [do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column))]
 

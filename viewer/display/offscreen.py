@@ -105,12 +105,13 @@ class OffscreenScene(ExitStack):
         self.state = replace(self.state, depth=depth)
         pictures = pictures_of(ready.scene)
         if pictures is not None:
-            wanted = views_seen_by(pictures, ready.scene.grid)
+            wanted = views_seen_by(pictures, ready.scene)
         self.view.open(ready)
         self.inspection.open()
         for result in results:
             assert isinstance(result, ViewReady)
             self.view.add(result.view)
+            self.view.take_hidden(result.hidden)
             self.inspection.add(result.view)
             self.view.upload_all()
             self.do(do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column)))

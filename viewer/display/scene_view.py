@@ -27,6 +27,7 @@ from viewer.gpu.refocus.views_seen import views_seen
 from viewer.model.state.app_state import AppState, DrawReport, Picture
 
 if TYPE_CHECKING:
+    from iibr_core.beyond.hidden_surfaces import HiddenSurface
     from iibr_core.gloss.shading import GlossMaps
 
 VIEW_REFRESH_S = 0.25
@@ -65,6 +66,7 @@ class SceneView:
         self._is_preview = self._is_edited = self._holds_picture = self._is_settled = False
         self._seen: frozenset[tuple[int, int]] | None = None
         self._final_seen = 0
+        self._hidden: HiddenSurface | None = None
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
         self._disparities: dict[ViewOffset, FloatImage] = {}
@@ -78,6 +80,7 @@ class SceneView:
         """
         scene, centre, before = ready.scene, ready.centre, self._scene
         self.show_fallback(None)
+        self._hidden = None
         self._show_alone(scene, centre, centre.disparity, None)
         self.generation, self.loaded, self._scene, self.centre = ready.generation, ready.loaded, scene, centre
         self._gloss, self._is_edited = None, False
@@ -122,6 +125,13 @@ class SceneView:
         if self.centre is not None and maps.disparity is self.centre.disparity:
             self._gloss = maps
             self.renderer.set_gloss(maps)
+            self.previews += 1
+
+    def take_hidden(self, surface: HiddenSurface | None) -> None:
+        """Show this surface behind the photo's through an open lens from now on; None changes nothing."""
+        if surface is not None:
+            self._hidden = surface
+            self.renderer.set_hidden(surface)
             self.previews += 1
 
     def add(self, view: ViewUpdate) -> None:
@@ -260,6 +270,7 @@ class SceneView:
         size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
         self.renderer.open_field(scene.grid, *size, scene.color_space, scene.row_step, is_single)
         self.renderer.set_gloss(gloss)
+        self.renderer.set_hidden(self._hidden)
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):
@@ -273,7 +284,7 @@ class SceneView:
         """Keep which views the picture that is begun will show, and whether all of them are there and final."""
         assert self._scene is not None
         grid, (row, column) = self._scene.grid, self._scene.grid.centre
-        seen = set() if self._fallback_view is not None else views_seen(optics, grid)
+        seen = set() if self._fallback_view is not None else views_seen(optics, grid, self._scene.has_view_disparity)
         self._seen = None if seen is None else frozenset((row + round(at.t), column + round(at.s)) for at in seen)
         self._final_seen = self._count_final_seen()
         self._is_settled = self._final_seen == self._seen_count

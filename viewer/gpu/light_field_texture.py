@@ -18,8 +18,10 @@ from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.gloss_texture import GlossTexture, Shared
+from viewer.gpu.hidden_texture import HiddenTexture
 
 if TYPE_CHECKING:
+    from iibr_core.beyond.hidden_surfaces import HiddenSurface
     from iibr_core.gloss.shading import GlossMaps
 
 _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255).astype(np.uint8)
@@ -29,6 +31,8 @@ HALF_MAX = float(np.finfo(np.float16).max)
 Box = tuple[slice, slice]
 """Rows and columns of pixels."""
 
+SAMPLE_SIZE = 8192
+"""About the number of disparities by which the slices of a picture through a lens are chosen."""
 RANGE_MARGIN = 0.05
 """Margin around the disparity range of the first view, as a share of it: later views may exceed the range a little."""
 
@@ -39,8 +43,9 @@ class LightFieldTexture:
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. layers: (V, U), layer of each view. present, has_disparity: (V, U) bool. uploads: (V, U), number of times
     that a view was stored. color_space: of the light. row_step: distance between rows, in distances between
-    columns. gloss: maps of a glossy surface, None without. range_px: (farthest, nearest) disparity, known from the
-    first view that has any. is_single: there is room for one of several views.
+    columns. gloss: maps of a glossy surface, None without. hidden: the surface behind the centre view's, None until it
+    is known. range_px: (farthest, nearest) disparity, disparity_sample: some disparities; both from the first view that
+    has any. is_single: there is room for one of several views.
     """
 
     def __init__(
@@ -66,6 +71,8 @@ class LightFieldTexture:
         self.present, self.has_disparity, self.uploads = np.zeros(grid, bool), np.zeros(grid, bool), np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
         self.gloss: GlossTexture | None = None
+        self.hidden: HiddenTexture | None = None
+        self.disparity_sample: FloatImage = np.zeros(1, np.float32)
         self.colors = _allocate(ctx, (width, height, count), 4, "f2" if hdr else "f1")
         self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.disparities = _allocate(ctx, (width, height, count) if with_disparity else (1, 1, 1), 1, "f2")
@@ -81,7 +88,7 @@ class LightFieldTexture:
         keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
         if disparity is not None and keeps_disparity:
             if not self.has_disparity.any():
-                self.range_px = _range_of(_finite_half(disparity))
+                self._measure(_finite_half(disparity))
             self._store_disparity(row, column, disparity, np.s_[0 : self.height, 0 : self.width])
         else:
             self._texels[..., 3] = 0
@@ -105,6 +112,18 @@ class LightFieldTexture:
         depth = np.clip((values - far) * (top_value / (near - far)), 0, top_value)
         np.copyto(self._texels[(*box, 3)], depth if self.hdr else np.rint(depth), casting="unsafe")
 
+    def _measure(self, disparity: FloatImage) -> None:
+        """Take range and sample from a disparity (H, W)."""
+        self.range_px = _range_of(disparity)
+        ends = disparity.min(), disparity.max()
+        self.disparity_sample = np.append(disparity.ravel()[:: max(disparity.size // SAMPLE_SIZE, 1)], ends)
+
+    def set_hidden(self, surface: HiddenSurface | None) -> None:
+        """Show this surface behind the centre view's through an open lens; None: no surface."""
+        if self.hidden is not None:
+            self.hidden.release()
+        self.hidden = None if surface is None else HiddenTexture(self._ctx, surface)
+
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """Use these maps for optics with gloss; None if there are none."""
         if self.gloss is not None:
@@ -118,9 +137,9 @@ class LightFieldTexture:
         """
         shared = copy(self)
         shared.present, shared.has_disparity = self.present.copy(), self.has_disparity.copy()
-        if self.gloss is not None:
-            self.gloss.hold()
-        self._arrays.hold()
+        for each in (self.gloss, self.hidden, self._arrays):
+            if each is not None:
+                each.hold()
         return shared
 
     @property
@@ -130,9 +149,9 @@ class LightFieldTexture:
 
     def release(self) -> None:
         """Free the arrays, unless another holder needs them."""
-        if self.gloss is not None:
-            self.gloss.release()
-        self._arrays.release()
+        for each in (self.gloss, self.hidden, self._arrays):
+            if each is not None:
+                each.release()
 
     def _viewport(self, row: int, column: int, box: Box) -> tuple[int, int, int, int, int, int]:
         rows, columns = box

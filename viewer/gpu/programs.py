@@ -15,31 +15,39 @@ from iibr_core.runtime.shader_sources import FlatSource, ShaderError, flatten
 from iibr_core.scenes.rect import WHOLE
 from iibr_core.types import ColorSpace
 
+OVER_ALL = "fullscreen.vert"
+"""Vertex shader of passes over the whole target."""
 _UNIFORM = re.compile(r"^\s*uniform\s+\w+\s+([^;]+);", re.MULTILINE)
 _MESSAGE_LINE = re.compile(r"^\s*(?:ERROR:\s*)?\d+[:(](\d+)(?:\(\d+\)|\))?\s*:", re.MULTILINE)
 """Place of an error in a driver's message: "0:12(3):", "0(12) :" or "ERROR: 0:12:"."""
 
 
 class Program:
-    """A pass over the whole target: `shaders/fullscreen.vert` and a fragment shader, with some switches on."""
+    """A pass: a fragment shader with some switches on, over the whole target unless another vertex shader is given."""
 
     def __init__(
-        self, ctx: moderngl.Context, fragment: str, switches: tuple[str, ...] = (), folder: Path | None = None
+        self,
+        ctx: moderngl.Context,
+        fragment: str,
+        switches: tuple[str, ...] = (),
+        folder: Path | None = None,
+        vertex: str = OVER_ALL,
     ) -> None:
         """Compile it. folder: folder of the shaders, None for the installed ones.
 
         Raises ShaderError with the file and line of the first error.
         """
         folder, defines = folder or resource_folder("shaders"), dict.fromkeys(switches, 1)
-        vertex, source = (flatten(folder / name, defines) for name in ("fullscreen.vert", fragment))
+        corners, source = (flatten(folder / name, defines) for name in (vertex, fragment))
         try:
-            self._program: Any = ctx.program(vertex_shader=vertex.text, fragment_shader=source.text)
+            self._program: Any = ctx.program(vertex_shader=corners.text, fragment_shader=source.text)
         except moderngl.Error as error:
-            stage = vertex if "vertex_shader" in str(error) else source
+            stage = corners if "vertex_shader" in str(error) else source
             raise ShaderError(_with_places(str(error), stage, fragment)) from error
-        self._name, self._declared = fragment, declared_uniforms(vertex.text + source.text)
-        self._quad = ctx.vertex_array(self._program, [])
-        self.set_uniforms(part=WHOLE)
+        self._name, self._declared = fragment, declared_uniforms(corners.text + source.text)
+        self._corners = ctx.vertex_array(self._program, [])
+        if vertex == OVER_ALL:
+            self.set_uniforms(part=WHOLE)
 
     def set_uniforms(self, **values: Any) -> None:
         """Set uniforms; those that the compiler optimised out are skipped.
@@ -56,19 +64,19 @@ class Program:
         """Set the conversion of light from one colour space to another, see shaders/include/primaries.glsl."""
         self.set_uniforms(target_from_source=tuple(primaries_matrix(target, source).T.ravel().tolist()))
 
-    def use_block(self, name: str, buffer: moderngl.Buffer) -> None:
-        """Use a buffer as the uniform block of this name."""
-        buffer.bind_to_uniform_block(0)
+    def use_block(self, name: str, buffer: moderngl.Buffer, offset: int = 0, size: int = -1) -> None:
+        """Use a buffer, or a part of it in bytes, as the uniform block of this name."""
+        buffer.bind_to_uniform_block(0, offset=offset, size=size)
         if (block := self._program.get(name, None)) is not None:
             block.binding = 0
 
-    def draw(self) -> None:
-        """Draw over the whole target."""
-        self._quad.render(moderngl.TRIANGLES, vertices=3)
+    def draw(self, vertices: int = 3) -> None:
+        """Draw triangles; three vertices cover the whole target."""
+        self._corners.render(moderngl.TRIANGLES, vertices=vertices)
 
     def release(self) -> None:
         """Free the program."""
-        self._quad.release()
+        self._corners.release()
         self._program.release()
 
 
@@ -99,11 +107,11 @@ class ProgramCache:
         """Return the number of programs compiled so far."""
         return len(self._programs)
 
-    def get(self, fragment: str, switches: Mapping[str, bool] | None = None) -> Program:
-        """Return the program of a fragment shader with those switches that are on. Raises ShaderError."""
-        key = fragment, *(name for name, is_on in (switches or {}).items() if is_on)
+    def get(self, fragment: str, switches: Mapping[str, bool] | None = None, vertex: str = OVER_ALL) -> Program:
+        """Return the program of two shaders with those switches that are on. Raises ShaderError."""
+        key = vertex, fragment, *(name for name, is_on in (switches or {}).items() if is_on)
         if key not in self._programs:
-            self._programs[key] = Program(self._ctx, fragment, key[1:])
+            self._programs[key] = Program(self._ctx, fragment, key[2:], vertex=vertex)
         return self._programs[key]
 
     def release(self) -> None:

@@ -52,6 +52,20 @@ class PictureTargets:
         self.light.release()
 
 
+class PinholeTargets:
+    """What an open lens blurs. light: sum of light, weighted by alpha. seen: disparity."""
+
+    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize) -> None:
+        self.size_px = ScreenSize(*size_px)
+        self.light = RenderTarget(ctx, size_px, "f4")
+        self.seen = RenderTarget(ctx, size_px, "f4")
+
+    def release(self) -> None:
+        """Free both."""
+        self.light.release()
+        self.seen.release()
+
+
 class TargetCache:
     """Targets of the last sizes. shown: the targets whose image is on the screen, None before the first picture."""
 

@@ -37,9 +37,10 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene, limits_aperture:
         ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0
         # (given - zero) * scale, for the given disparity that was in focus
         shift = (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
-    aperture = optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0])
+    # discs stay as wide as they are
+    aperture = optics.aperture_diameter / abs(ratio) if ratio else optics.aperture_diameter
     if limits_aperture:
-        aperture = min(aperture, aperture_limit(new.grid))
+        aperture = min(aperture, aperture_limit(new))
     return replace(
         optics.with_focus_scaled(ratio),
         eye=clamp_eye(eye, new.grid),

@@ -23,7 +23,7 @@ def preset_optics(name: PresetName, optics: Optics, scene: Scene, subject: float
     plain = replace(optics, focus_range=0.0, focus_tilt=(0.0, 0.0))
     if name == "everything sharp":
         return replace(plain, aperture_diameter=0.0)
-    plain = replace(plain, aperture_diameter=aperture_limit(scene.grid), aperture_shape=ApertureShape())
+    plain = replace(plain, aperture_diameter=aperture_limit(scene), aperture_shape=ApertureShape())
     if name == "macro":
         return replace(plain, focus_disparity=scene.disparity_range_px[1])
     focused = replace(plain, focus_disparity=subject, focus_range=PORTRAIT_RANGE * focus_span(scene))

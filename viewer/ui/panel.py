@@ -92,7 +92,7 @@ def _picture(state: AppState, scene: Scene) -> list[Action]:
         if button("Saved files…###files", f"{latest} and others that were saved or exported"):
             actions.append(do(messages.show_prompt, "files"))
     else:
-        quiet(HINT if aperture_limit(scene.grid) else FLAT_HINT)
+        quiet(HINT if aperture_limit(scene) else FLAT_HINT)
     gap()
     for section in SECTIONS:
         actions += _section(section, state, scene)
@@ -190,7 +190,7 @@ def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
     sections = state.preferences.open_sections
     if section in PARENT_SECTION and not is_seen_open(PARENT_SECTION[section], sections):
         return []
-    if section in ("focus", "aperture", "view", "stereo display") and not aperture_limit(scene.grid):
+    if section in ("focus", "aperture", "view", "stereo display") and not aperture_limit(scene):
         return []
     is_open = section in sections
     is_toggled = heading(section.capitalize(), is_open)

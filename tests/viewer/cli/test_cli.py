@@ -237,7 +237,7 @@ def test_values_beyond_the_scene_are_refused_or_limited_with_a_note(
 ) -> None:
     words = ("screenshot", photo_path, "--grid", 3, "-o", tmp_path / "o.png")
     assert "--view: S is 5; scene has -1 to 1" in refusal_of(iibr(*words, "--view", "5,0"))
-    assert "note: --aperture 99 exceeds what the scene has; 3 is used." in iibr(*words, "--aperture", 99).stderr
+    assert "note: --aperture 99 exceeds what the scene has; 15 is used." in iibr(*words, "--aperture", 99).stderr
 
 
 def test_plan_names_size_depth_and_reasons(iibr: Iibr, photo_path: Path) -> None:

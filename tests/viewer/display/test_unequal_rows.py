@@ -28,10 +28,10 @@ at most where rows were taken for as far apart as columns.
 
 
 def through_lens(focus: float, aperture: float) -> np.ndarray:
-    """Return the mean, in linear light, of what cameras in a disc see; its diameter counts steps of the grid."""
+    """Return the mean, in linear light, of what cameras in a round disc see; its diameter counts columns."""
     places = np.linspace(-aperture / 2, aperture / 2, 13)
     inside = [(t, s) for t in places for s in places if np.hypot(t, s) <= aperture / 2]
-    return srgb_from_linear(np.mean([linear_from_srgb(seen(ROW_STEP * t, s, focus)) for t, s in inside], axis=0))
+    return srgb_from_linear(np.mean([linear_from_srgb(seen(t, s, focus)) for t, s in inside], axis=0))
 
 
 def psnr(one: np.ndarray, other: np.ndarray) -> float:

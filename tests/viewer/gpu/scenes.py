@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_shape import openness
+from iibr_core.beyond.aperture_shape import opening
+from iibr_core.beyond.hidden_surfaces import SeenBehind, hidden_surface
 from iibr_core.beyond.optics import Optics
-from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.picture_renderer import Renderer
@@ -58,10 +60,14 @@ class TwoPlanes:
         renderer.upload_view(row, column, colors, disparity if with_disparity else None)
 
     def fill(self, renderer: Renderer, grid: GridShape, with_disparity: bool = True) -> None:
-        """Open the field and upload every view."""
+        """Open the field and upload every view, and the surface behind the centre view's as the outer views show it."""
         self.open(renderer, grid, with_disparity)
         for at in np.ndindex(*grid):
             self.upload(renderer, grid, *at, with_disparity)
+        if with_disparity:
+            seen = [SeenBehind(at, *self.view(at), None) for at in outer_views_of_grid(grid)]
+            colors, disparity = self.view(ViewOffset(0.0, 0.0))
+            renderer.set_hidden(hidden_surface(encoded_from_stored(colors), disparity, max(grid), seen))
 
 
 class PhotoLike(TwoPlanes):
@@ -75,14 +81,14 @@ class PhotoLike(TwoPlanes):
         return np.clip(0.5 + 0.0017 * waves[..., None] * np.array([1.0, 0.8, 0.6]), 0, 1)
 
 
-def through_lens(scene: TwoPlanes, optics: Optics, grid: GridShape, across: int = 20) -> NDArray[np.uint8]:
+def through_lens(scene: TwoPlanes, optics: Optics, across: int = 24) -> NDArray[np.uint8]:
     """The picture by brute force: the mean, in linear light, of cameras `across` the opening in each direction, each
-    seeing the scene itself. The opening is as wide as the grid at most.
+    seeing the scene itself.
     """
     y, x = np.indices((scene.height, scene.width)).astype(float)
     t, s = eyes_of_pixels(optics, scene)
     focus, total, weights = focus_of_pixels(optics, scene), np.zeros((scene.height, scene.width, 3)), 0.0
-    for (dt, ds), weight in zip(*camera_grid(optics, grid, across)):
+    for (dt, ds), weight in zip(*camera_grid(optics, across)):
         colors, _ = scene.seen(x - focus * ds, y - focus * dt, t + dt, s + ds)
         left = weight * barrel_share(optics, scene, dt, ds)[..., None]
         total += left * linear_from_srgb(colors)
@@ -90,13 +96,12 @@ def through_lens(scene: TwoPlanes, optics: Optics, grid: GridShape, across: int 
     return np.rint(np.clip(srgb_from_linear(total / weights), 0, 1) * 255).astype(np.uint8)
 
 
-def camera_grid(optics: Optics, grid: GridShape, across: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def camera_grid(optics: Optics, across: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Places (N, 2) all over the opening, (t, s) from its middle, and how open it is there."""
     diameter = optics.aperture_diameter
-    widest = min(diameter, float(max(grid)))
-    places = widest * ((np.arange(across) + 0.5) / across - 0.5)
+    places = diameter * ((np.arange(across) + 0.5) / across - 0.5)
     t, s = (axis.ravel() for axis in np.meshgrid(places, places, indexing="ij"))
-    weights = openness(optics.aperture_shape, t, s, diameter, widest, widest / across)
+    weights = opening(optics.aperture_shape, t, s, diameter, diameter / across)
     return np.stack([t, s], -1)[weights > 0], weights[weights > 0]
 
 

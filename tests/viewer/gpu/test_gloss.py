@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.gloss.geometry import SceneGeometry
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.gloss.shading import GlossMaps, make_gloss_maps, shade
@@ -68,18 +65,6 @@ def test_other_viewpoints_are_the_cores_too(renderer: Renderer, gloss: Gloss, ey
     photo, maps = open_flat(renderer, gloss)
     renderer.render(Optics(eye=eye, gloss=gloss), (WIDTH, HEIGHT))
     assert rms(renderer.read_image(), shaded(gloss, maps, photo, eye)) < 0.006
-
-
-def test_through_an_aperture_each_point_of_the_lens_sees_its_own_highlight(renderer: Renderer) -> None:
-    """On the plane in focus, the picture is the mean of the views' gloss, in linear light."""
-    dim = replace(LIT, roughness=0.1, light=GlossLight((0.1, -0.1, -1), (0.003, 0.003, 0.003), radius_deg=1.0))
-    photo, maps = open_flat(renderer, dim)
-    optics = Optics(focus_disparity=2.0, aperture_diameter=3.0, gloss=dim)
-    drawn = renderer.converged_picture(RenderSettings(optics, (WIDTH, HEIGHT)))
-    narrow = shaded(dim, maps, photo, ViewOffset(0.0, 0.0))
-    assert rms(drawn, narrow) < 0.05
-    assert drawn.max() < narrow.max(), "the lobe is seen from several directions"
-    assert drawn.astype(int).sum() == pytest.approx(narrow.astype(int).sum(), rel=0.03)
 
 
 @pytest.mark.parametrize(("gloss", "is_upright"), [(LIT, False), (METAL, True)])

@@ -59,7 +59,7 @@ def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer: Renderer) 
     scene = TwoPlanes(radius_px=0.0)
     scene.fill(renderer, GRID)
     optics = Optics(ViewOffset(0.0, 4.0), focus_disparity=2.0, aperture_diameter=3.0)
-    truth = through_lens(scene, optics, GRID)
+    truth = through_lens(scene, optics)
     assert rms(settled(renderer, optics, scene), truth, border=14) < 0.01
 
 
@@ -68,10 +68,10 @@ def test_lens_against_brute_force(renderer: Renderer, focus: float, diameter: fl
     SCENE.fill(renderer, GRID)
     optics = Optics(focus_disparity=focus, aperture_diameter=diameter)
     image = settled(renderer, optics, SCENE)
-    likeness = psnr(image, through_lens(SCENE, optics, GRID), border=14)
+    likeness = psnr(image, through_lens(SCENE, optics), border=14)
     assert likeness > 38
     for wrong in (replace(optics, focus_disparity=-focus), replace(optics, aperture_diameter=min(diameter, 5.0) / 2)):
-        assert psnr(image, through_lens(SCENE, wrong, GRID), border=14) < likeness - 3
+        assert psnr(image, through_lens(SCENE, wrong), border=14) < likeness - 3
 
 
 def test_error_never_grows_while_the_field_fills(renderer: Renderer) -> None:

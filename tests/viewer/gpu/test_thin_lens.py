@@ -11,9 +11,11 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from iibr_core.beyond.hidden_surfaces import SeenBehind, hidden_surface
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.method.light_field import generate
 from iibr_core.types import ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
@@ -42,6 +44,11 @@ def drawn_db(renderer: Renderer, scene: LensScene, field: Field) -> float:
     renderer.open_field(GRID, width, height, hdr=False, with_disparity=field[0, 0].disparity is not None)
     for update in field.values():
         renderer.upload_view(update.row, update.column, update.colors, update.disparity)
+    if field[0, 0].disparity is not None:
+        outer = [(at, field[GRID.index_of(at)]) for at in outer_views_of_grid(GRID)]
+        seen = [SeenBehind(at, view.colors, view.disparity, view.inpainted) for at, view in outer]
+        radius = scene.lens.radius_views
+        renderer.set_hidden(hidden_surface(scene.photo.pixels, scene.disparity.values, radius, seen))
     picture = renderer.converged_picture(RenderSettings(optics, (width, height)))
     return scene.lens_db(picture.astype(np.float32) / np.float32(255))
 

@@ -13,7 +13,6 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.passes import Passes, ProgressiveAccumulation, Rows
-from viewer.gpu.render_targets import PictureTargets
 
 MIN_ROWS = 16
 """Smallest number of rows of a step: fewer rows save no time, because a draw has a cost of its own."""
@@ -34,7 +33,7 @@ class Accumulator:
         self,
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
-        targets: PictureTargets,
+        target: moderngl.Framebuffer,
         passes: int,
         budget_s: float = math.inf,
         seconds_per_sample: float = 0.0,
@@ -46,7 +45,7 @@ class Accumulator:
         end = time.perf_counter() + budget_s
         count = int(min(max(budget_s / max(seconds_per_sample, 1e-9), 1), MAX_SAMPLES))
         while accumulation.pass_index < passes:
-            for _ in self._draw_batch(field, accumulation, targets, count, math.inf):
+            for _ in self._draw_batch(field, accumulation, target, count, math.inf):
                 pass
             if budget_s < math.inf:
                 self._ctx.finish()  # a driver that queues its work shows no time before
@@ -58,7 +57,7 @@ class Accumulator:
         self,
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
-        targets: PictureTargets,
+        target: moderngl.Framebuffer,
         pixels_per_step: float,
     ) -> Iterator[None]:
         """Draw all passes in steps of about so many pixels times cameras; anything else may be drawn between two steps.
@@ -66,34 +65,44 @@ class Accumulator:
         The sum does not depend on the size of the steps, to the last bit: they split rows, never cameras.
         """
         while not accumulation.is_complete:
-            yield from self._draw_batch(field, accumulation, targets, MAX_SAMPLES, pixels_per_step)
+            yield from self._draw_batch(field, accumulation, target, MAX_SAMPLES, pixels_per_step)
+
+    def draw_disparity(
+        self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, target: moderngl.Framebuffer
+    ) -> None:
+        """Draw the disparity that the eye sees, after a pass."""
+        target.clear()
+        if accumulation.samples is not None:
+            batch, rows = accumulation.samples.part(0, 1), (0, target.size[1])
+            self.passes.draw_lens(field, accumulation, batch, target, rows, is_disparity=True)
+        self._ctx.disable(moderngl.BLEND)
 
     def _draw_batch(
         self,
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
-        targets: PictureTargets,
+        target: moderngl.Framebuffer,
         count: int,
         pixels_per_step: float,
     ) -> Iterator[None]:
         """Draw the next cameras of a pass, at most `count`, in bands of rows."""
-        lens, at = accumulation.lens, accumulation.at
+        lens, at = accumulation.drawn_lens, accumulation.at
         if at == 0 and accumulation.pass_index == 0:
-            targets.light.framebuffer.clear()
+            target.clear()
         if not field.present.any():
             accumulation.pass_index = accumulation.passes
             return
         if at == 0:
-            accumulation.samples = lens.samples(field, accumulation.pass_index)
+            accumulation.samples = lens.samples(field)
             if accumulation.pass_index == 0 and lens.has_dolly:
                 self.passes.update_nearest_views(field)
         samples = accumulation.samples
         assert samples is not None
         # The views that answer a pinhole are blended: none is shown alone.
         batch = samples if lens.diameter == 0 else samples.part(at, at + count)
-        for rows in _row_bands(targets.size_px, pixels_per_step / len(batch)):
+        for rows in _row_bands(ScreenSize(*target.size), pixels_per_step / len(batch)):
             self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            self.passes.draw_lens(field, accumulation, batch, targets, rows)
+            self.passes.draw_lens(field, accumulation, batch, target, rows)
             yield
         accumulation.at, accumulation.done = at + len(batch), accumulation.done + len(batch)
         if accumulation.at >= len(samples):

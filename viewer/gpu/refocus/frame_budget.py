@@ -18,6 +18,8 @@ PICTURE_FETCHES = 4.0
 """Cost of a pixel without any camera."""
 COLOR_FETCHES, WARP_FETCHES = 3.0, 2.0
 """Cost of a camera's colour at a pixel, and of finding the surface that it sees."""
+OPEN_FETCHES = 120.0
+"""Cost of a pixel of a picture through an open lens, beside that of the pinhole's picture."""
 UNMEASURED = 2.0
 """Factor on the guess for work that was not drawn yet: the first frame of a drag must not stall."""
 OVERHEAD_S = 0.003

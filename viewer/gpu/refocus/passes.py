@@ -14,7 +14,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
-from viewer.gpu.refocus.picture_lens import BARREL_EDGE, Lens
+from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import Samples, nearest_present
 from viewer.gpu.render_targets import PictureTargets
 
@@ -31,7 +31,8 @@ Rows = tuple[int, int]
 class ProgressiveAccumulation:
     """A picture being summed up: cameras before camera `at` of pass `pass_index` are drawn, out of `passes` passes.
 
-    samples: cameras of this pass. done: number of cameras drawn in all passes.
+    lens, size_px: of the picture. passes: of the pinhole's picture, which an open lens then blurs; of the picture
+    itself without slices. samples: cameras of this pass. done: number of cameras drawn in all passes.
     """
 
     lens: Lens
@@ -46,6 +47,17 @@ class ProgressiveAccumulation:
     def is_complete(self) -> bool:
         """Whether every pass is drawn."""
         return self.pass_index == self.passes
+
+    @property
+    def drawn_px(self) -> ScreenSize:
+        """Size of what the passes draw: with the margin of an open lens."""
+        width, height = self.size_px
+        return ScreenSize(width + 2 * self.lens.margin_px, height + 2 * self.lens.margin_px)
+
+    @property
+    def drawn_lens(self) -> Lens:
+        """The lens of the passes."""
+        return self.lens.pinhole(self.size_px) if self.lens.slices else self.lens
 
 
 class Passes:
@@ -68,14 +80,16 @@ class Passes:
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
         batch: Samples,
-        targets: PictureTargets,
+        framebuffer: moderngl.Framebuffer,
         rows: Rows,
+        is_disparity: bool = False,
     ) -> None:
         """Add the light of at most MAX_SAMPLES cameras of a pass to some rows of the target.
 
         The search for surfaces depends on all cameras of the pass, so the picture does not depend on the batches.
+        is_disparity: disparity is written, not light.
         """
-        lens, samples = accumulation.lens, accumulation.samples
+        lens, samples = accumulation.drawn_lens, accumulation.samples
         assert samples is not None
         has_views_to_warp = bool(field.has_disparity.any())
         program = self._programs.get(
@@ -87,16 +101,14 @@ class Passes:
                 "DOLLY": lens.has_dolly,
                 "GLOSS": field.gloss is not None and lens.optics.gloss is not None,
                 "HIGHLIGHTS": lens.highlight_gain > 0,
-                "CAT_EYE": lens.optics.aperture_shape.kind == "cat_eye",
+                "SEEN": is_disparity,
             },
         )
-        width, height = targets.size_px
+        width, height = framebuffer.size
         across, down = lens.part.width / lens.field_part.width, lens.part.height / lens.field_part.height
         self._set_field(program, field, lens)
-        self._set_samples(program, field, lens, batch, accumulation.done)
-        cell = lens.cell(accumulation.pass_index)
-        program.set_uniforms(cell_views=cell, pixel_uv=(across / width, down / height), field_part=lens.field_part)
-        framebuffer = targets.light.framebuffer
+        self._set_samples(program, field, lens, batch, accumulation.done, is_disparity)
+        program.set_uniforms(pixel_uv=(across / width, down / height), field_part=lens.field_part)
         framebuffer.scissor = 0, rows[0], width, rows[1] - rows[0]
         framebuffer.use()
         # Blending is on for the first light, too: drivers compile a program again for passes that replace.
@@ -138,7 +150,6 @@ class Passes:
         field.colors.use(COLORS)
         field.disparities.use(DISPARITIES)
         far, near = field.range_px
-        aspect = field.height / field.width * lens.field_part.width / lens.field_part.height
         program.set_uniforms(
             colors=COLORS,
             disparities=DISPARITIES,
@@ -151,16 +162,15 @@ class Passes:
             focus_range=max(lens.optics.focus_range, 0.0),
             dolly=lens.dolly,
             highlight_gain=lens.highlight_gain,
-            barrel=lens.barrel(aspect),
-            barrel_edge=max(BARREL_EDGE * lens.diameter, 1e-6),
             part=lens.part,
         )
         if field.gloss is not None and lens.optics.gloss is not None:
             field.gloss.use(program, lens.optics.gloss, (lens.eye.s, lens.eye.t))
 
     def _set_samples(
-        self, program: Program, field: LightFieldTexture, lens: Lens, samples: Samples, first: int
+        self, program: Program, field: LightFieldTexture, lens: Lens, samples: Samples, first: int, is_one_view: bool
     ) -> None:
+        """Write the cameras and their views. is_one_view: with dolly, the nearest corner of a cell answers alone."""
         count = len(samples)
         table = np.zeros((3, MAX_SAMPLES, 4), np.float32)
         cameras, answers, numbers = table
@@ -174,7 +184,9 @@ class Passes:
         numbers[:count, 2] = samples.weights
         if lens.has_dolly:
             assert self._nearest_views is not None
-            if lens.diameter == 0:
+            if is_one_view:
+                answers[:count, :2] = 0.5
+            elif lens.diameter == 0:
                 answers[:count, :2], answers[:count, 2] = CORNERS, 1
             else:
                 answers[:count, :2] = fractions(first, count, SQRT_STEPS[1::-1])

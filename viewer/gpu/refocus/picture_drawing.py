@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,17 +14,20 @@ from numpy.typing import NDArray
 
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import ColorSpace, ViewUpdate
+from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator
+from viewer.gpu.refocus.discs import Discs
 from viewer.gpu.refocus.passes import ProgressiveAccumulation
-from viewer.gpu.render_targets import PictureTargets
+from viewer.gpu.render_targets import PictureTargets, PinholeTargets
 
 STEP_S = 0.005
 """Time of a step in seconds; a drag waits for one step at most."""
 
+MAX_OPEN_TILE_PX = 1024
+"""The same limit for an open lens, whose targets take more, and have a margin."""
 MAX_TILE_PX = 2048
 """Largest side of a tile in pixels; its targets take at most 32 bytes a pixel."""
 
@@ -70,21 +74,22 @@ class PictureDrawing:
         whole: ProgressiveAccumulation,
         is_linear: bool,
         color_space: ColorSpace,
-        views: Sequence[ViewUpdate] = (),
     ) -> None:
         """Prepare the drawing.
 
         field: shared until `stop`; views that it gets later are not drawn. whole: the picture, not begun. is_linear,
-        color_space: see `RenderSettings`. views: uploaded first, a view a step.
+        color_space: see `RenderSettings`.
         """
         width, height = whole.size_px
+        self._discs = Discs(gl.ctx, programs)
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
         self.is_done = self._is_released = self._is_in_steps = False
         self._gl = gl
         self._accumulator = Accumulator(gl.ctx, programs)
         self._field = field.share()
-        self._whole, self._views, self._is_linear, self._color_space = whole, views, is_linear, color_space
-        self._tiles = picture_tiles(whole.size_px, gl.max_texture_size)
+        self._whole, self._is_linear, self._color_space = whole, is_linear, color_space
+        max_px = MAX_OPEN_TILE_PX if whole.lens.slices else gl.max_texture_size
+        self._tiles = picture_tiles(whole.size_px, min(max_px, gl.max_texture_size))
         self._tiles_done = 0
         self._current: ProgressiveAccumulation | None = None
         self._steps = self._draw()
@@ -121,27 +126,35 @@ class PictureDrawing:
             self._is_released = True
             self._steps.close()
             self._accumulator.release()
+            self._discs.release()
             self._field.release()
 
     def _draw(self) -> Generator[None]:
-        for view in self._views:
-            self._field.upload(view.row, view.column, view.colors, view.disparity)
-            yield
         for tile in self._tiles:
-            targets = PictureTargets(self._gl.ctx, tile.size_px, "f4" if self._is_linear else "f1")
-            try:
-                yield from self._draw_tile(tile, targets)
-            finally:
-                targets.release()
+            with ExitStack() as stack:
+                yield from self._draw_tile(tile, stack)
             self._tiles_done, self._current = self._tiles_done + 1, None
             yield
         self.is_done = True
 
-    def _draw_tile(self, tile: PictureTile, targets: PictureTargets) -> Generator[None]:
+    def _draw_tile(self, tile: PictureTile, stack: ExitStack) -> Generator[None]:
+        """Draw a tile. stack: frees its targets."""
+        targets = PictureTargets(self._gl.ctx, tile.size_px, "f4" if self._is_linear else "f1")
+        stack.callback(targets.release)
         lens = replace(self._whole.lens, part=self._whole.lens.part.part(tile.window))
         self._current = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
         pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
-        yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)
+        if lens.slices:
+            pinhole = PinholeTargets(self._gl.ctx, accumulation.drawn_px)
+            stack.callback(pinhole.release)
+            yield from self._accumulator.sum_up_in_steps(self._field, accumulation, pinhole.light.framebuffer, pixels)
+            self._accumulator.draw_disparity(self._field, accumulation, pinhole.seen.framebuffer)
+            yield from self._discs.steps(
+                self._field, lens, pinhole.light.texture, pinhole.seen.texture, targets.light.framebuffer
+            )
+        else:
+            target = targets.light.framebuffer
+            yield from self._accumulator.sum_up_in_steps(self._field, accumulation, target, pixels)
         self._accumulator.passes.present(lens, targets, self._is_linear, self._color_space)
         yield
         self.image[tile.rows, tile.columns] = targets.image.read()

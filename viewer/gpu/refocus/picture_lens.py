@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from iibr_core.beyond.aperture_sampling import aperture_points, open_area
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.beyond.aperture_sampling import aperture_points
+from iibr_core.beyond.lens_slices import Slice, slices_of
 from iibr_core.beyond.optics import Optics
-from iibr_core.beyond.picture_quality import (
-    BEST_QUALITY,
-    BLEND_POINTS,
-    CAMERAS_PER_PX,
-    EDGE_PASSES,
-    FIRST_SPACING_PX,
-    MAX_CAMERAS,
-    MAX_PASS,
-    MIN_CAMERAS,
-    MIN_PASS,
-    QualityLevel,
-)
+from iibr_core.beyond.picture_quality import BEST_QUALITY, BLEND_POINTS, EDGE_PASSES, QualityLevel
 from iibr_core.scenes.rect import WHOLE, Rect
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus import view_sampling
@@ -27,28 +21,38 @@ from viewer.gpu.refocus.view_sampling import Samples
 
 BARREL_EDGE = 1 / 16
 """Width of the edge of a cat's-eye, as a share of the aperture's diameter."""
+TILT_STEPS = 17
+"""Number of places across the picture at which a tilted focus is looked at."""
+EDGE_MARGIN_PX = 4
+"""Pixels around the discs that edges and reductions need."""
 
 
 @dataclass(frozen=True)
 class Lens:
     """The lens of one picture.
 
-    diameter: of the aperture, view steps, 0 for a pinhole. widest: side of the square of views, which cuts it off.
-    dolly: change of the place (s, t) where rays cross the grid, view steps per picture size. blur_px: width of the
-    widest blur in this field, output pixels. level: limits of quality. part: drawn part of the picture. field_part:
-    part of the picture that the field's views show. color_space: of the field's light.
+    diameter: of the aperture, view steps, 0 for a pinhole. slices: of the picture through an open lens, from near to
+    far; none for a pinhole, and for views without disparity, which are added up instead. dolly: change of the place
+    (s, t) where rays cross the grid, view steps per picture size. disc_px: diameter of a disc in output pixels, for
+    1 px per view step out of focus. texel_px: size of a pixel of the views in output pixels. level: limits of quality.
+    part: drawn part of the picture. field_part: part of the picture that the field's views show. color_space: of the
+    field's light. hidden_scale: factor from the disparity of the hidden surface to that of the views. behind_eye:
+    (s, t) of the eye from the viewpoint of the hidden surface, in its view steps.
     """
 
     optics: Optics
     diameter: float
-    widest: float
+    slices: tuple[Slice, ...]
     dolly: tuple[float, float]
-    blur_px: float
+    disc_px: float
+    texel_px: float
     highlight_gain: float
     level: QualityLevel
     part: Rect = WHOLE
     field_part: Rect = WHOLE
     color_space: ColorSpace = SRGB
+    hidden_scale: float = 1.0
+    behind_eye: tuple[float, float] = (0.0, 0.0)
 
     @property
     def eye(self) -> ViewOffset:
@@ -60,91 +64,73 @@ class Lens:
         """Whether rays of different pixels cross the grid at different places."""
         return self.dolly != (0.0, 0.0)
 
+    @property
+    def margin_px(self) -> int:
+        """Width of the border around the picture whose light the discs spread into it, in output pixels."""
+        return math.ceil(max(each.reach_px for each in self.slices)) + EDGE_MARGIN_PX if self.slices else 0
+
     def barrel(self, aspect: float) -> tuple[float, float, float]:
-        """Return the motion of the barrel's opening across the picture (s, t) and its radius, view steps.
+        """Return the motion of the barrel's opening across the picture (s, t) and its radius, in radii of the opening.
 
         aspect: height / width.
         """
-        radius = self.diameter / 2
-        across = 2 * self.optics.aperture_shape.cat_eye * radius / math.hypot(1.0, aspect)
-        return across, across * aspect, radius
+        across = 2 * self.optics.aperture_shape.cat_eye / math.hypot(1.0, aspect)
+        return across, across * aspect, 1.0
 
-    @property
-    def cameras_per_pass(self) -> int:
-        """Number of cameras of a pass through an aperture, at this quality."""
-        best = min(max(math.ceil(self.blur_px / FIRST_SPACING_PX), MIN_PASS), MAX_PASS)
-        return max(round(best * self.level.cameras), 1)
-
-    @property
-    def passes_through_aperture(self) -> int:
-        """Number of passes until the most blurred surface is smooth."""
-        if self.level != BEST_QUALITY:
-            return 1
-        cameras = min(max(CAMERAS_PER_PX * self.blur_px, MIN_CAMERAS), MAX_CAMERAS)
-        return math.ceil(cameras / self.cameras_per_pass)
+    def pinhole(self, size_px: ScreenSize) -> Lens:
+        """Return the pinhole whose picture, with a margin, becomes this lens' picture of a size."""
+        return replace(self, diameter=0.0, slices=(), part=grown(self.part, self.margin_px, size_px))
 
     def pass_count(self, field: LightFieldTexture) -> int:
-        """Return the number of passes until the most blurred surface and all edges are smooth."""
-        is_warped = bool(field.has_disparity.any())
-        if not (is_warped or self.has_dolly):
-            return 1
-        if self.diameter > 0:
-            return self.passes_through_aperture
+        """Return the number of passes until all edges are smooth."""
         is_moved = self.has_dolly or not is_stored(self.eye, field)
-        return EDGE_PASSES if self.level == BEST_QUALITY and is_moved else 1
+        is_warped = bool(field.has_disparity.any()) or self.has_dolly
+        return EDGE_PASSES if is_warped and is_moved and self.level == BEST_QUALITY else 1
 
-    def samples(self, field: LightFieldTexture, pass_index: int) -> Samples:
+    def samples(self, field: LightFieldTexture) -> Samples:
         """Return the cameras of a pass and the views that answer them. field: has views."""
         grid, present = field.grid, field.present
-        if self.diameter == 0 and self.has_dolly:
+        if self.has_dolly and self.diameter == 0:
             return view_sampling.every_corner()
         if self.diameter == 0:
             sources = view_sampling.pinhole_sources(self.eye, grid, present)
             return view_sampling.pinhole_samples(sources[: self.level.sources])
-        is_blend = not (field.has_disparity.any() or self.has_dolly)
-        count = BLEND_POINTS if is_blend else self.cameras_per_pass
-        cell = 0.0 if is_blend else self.cell(pass_index)
-        points = aperture_points(self.optics.aperture_shape, self.diameter, self.widest, count, pass_index, cell)
-        if is_blend:
-            return view_sampling.blended_samples(points, self.eye, grid, present)
-        return view_sampling.answered_samples(points, pass_index * count, self.eye, grid, present)
-
-    def cell(self, pass_index: int) -> float:
-        """Return the side, in view steps, of the square of the aperture around each camera of a pass.
-
-        The first pass, which is shown alone, fills the aperture by itself; the other cameras share it with all.
-        """
-        if self.diameter == 0:
-            return 0.0
-        passes = self.passes_through_aperture if pass_index > 0 else 1
-        area = open_area(self.optics.aperture_shape, self.diameter, self.widest)
-        return math.sqrt(area / (self.cameras_per_pass * passes))
+        points = aperture_points(self.optics.aperture_shape, self.diameter, float(max(grid)), BLEND_POINTS, 0)
+        return view_sampling.blended_samples(points, self.eye, grid, present)
 
     def sample_count(self, field: LightFieldTexture) -> int:
         """Return the number of samples of a pass."""
-        return len(self.samples(field, 0)) if field.present.any() else 0
+        lens = replace(self, diameter=0.0) if self.slices else self
+        return len(lens.samples(field)) if field.present.any() else 0
 
 
-def lens_of(
-    optics: Optics,
-    field: LightFieldTexture,
-    width_px: int,
-    level: QualityLevel = BEST_QUALITY,
-    widest: float | None = None,
-) -> Lens:
-    """Return the lens of a picture of that width. widest: see `Lens`; None for the side of the grid."""
+def lens_of(optics: Optics, field: LightFieldTexture, width_px: int, level: QualityLevel = BEST_QUALITY) -> Lens:
+    """Return the lens of a picture of that width."""
     diameter = max(optics.aperture_diameter, 0.0)
-    widest = float(max(field.grid)) if widest is None else widest
+    texel_px = width_px / field.width
+    disc_px = diameter * texel_px
+    widest = float(np.abs(_defocus_px(optics, field, disc_px)).max())
+    # Wider discs than the picture would only take memory.
+    disc_px *= min(1.0, width_px / max(widest, 1e-9))
+    is_open = disc_px > 0 and bool(field.has_disparity.any())
     return Lens(
         optics=optics,
         diameter=diameter,
-        widest=widest,
+        slices=slices_of(_defocus_px(optics, field, disc_px), optics.aperture_shape) if is_open else (),
         dolly=dolly_of(optics, field),
-        blur_px=min(diameter, widest) * _max_defocus(optics, field.range_px) * width_px / field.width,
+        disc_px=disc_px,
+        texel_px=texel_px,
         highlight_gain=optics.highlight_gain(diameter, field.hdr),
         level=level,
         color_space=field.color_space,
+        behind_eye=(optics.eye.s, field.row_step * optics.eye.t),
     )
+
+
+def grown(part: Rect, margin_px: int, size_px: ScreenSize) -> Rect:
+    """Return a part of a picture with a margin, in pixels of its target."""
+    across, down = margin_px * part.width / size_px.width, margin_px * part.height / size_px.height
+    return Rect(part.x - across, part.y - down, part.width + 2 * across, part.height + 2 * down)
 
 
 def dolly_of(optics: Optics, field: LightFieldTexture) -> tuple[float, float]:
@@ -160,8 +146,9 @@ def is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
     return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])
 
 
-def _max_defocus(optics: Optics, range_px: tuple[float, float]) -> float:
-    """Return the largest difference between a disparity and the sharp ones."""
+def _defocus_px(optics: Optics, field: LightFieldTexture, disc_px: float) -> NDArray[np.float64]:
+    """Return the diameters of discs that occur in a picture, negative behind the focus."""
     tilt = sum(map(abs, optics.focus_tilt))
-    farthest = max(abs(edge - optics.focus_disparity) for edge in range_px) + tilt
-    return max(farthest - max(optics.focus_range, 0.0), 0.0)
+    focus = optics.focus_disparity + np.linspace(-tilt, tilt, TILT_STEPS if tilt else 1)
+    beside = field.disparity_sample[:, None].astype(np.float64) - focus
+    return disc_px * np.sign(beside) * np.maximum(np.abs(beside) - max(optics.focus_range, 0.0), 0.0)

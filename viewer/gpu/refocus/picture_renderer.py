@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -25,13 +26,22 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator
-from viewer.gpu.refocus.frame_budget import FrameTimeModel, choose_quality_level, fetches_of, scale_size, stretch_image
+from viewer.gpu.refocus.discs import Discs
+from viewer.gpu.refocus.frame_budget import (
+    OPEN_FETCHES,
+    FrameTimeModel,
+    choose_quality_level,
+    fetches_of,
+    scale_size,
+    stretch_image,
+)
 from viewer.gpu.refocus.passes import ProgressiveAccumulation
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
-from viewer.gpu.render_targets import PictureTargets, TargetCache
+from viewer.gpu.render_targets import PictureTargets, PinholeTargets, TargetCache
 
 if TYPE_CHECKING:
+    from iibr_core.beyond.hidden_surfaces import HiddenSurface
     from iibr_core.gloss.shading import GlossMaps
 
 
@@ -51,10 +61,13 @@ class Renderer:
         self.draw_s = 0.0
         self.programs: ProgramCache = shared.programs if shared else ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
+        self._discs = Discs(self.ctx, self.programs)
+        self._pinhole: PinholeTargets | None = None
+        self._opening: Iterator[None] | None = None
         self._fallback_view: LightFieldTexture | None = None
         self._targets = TargetCache(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
-        self._shown_from_pass = self.level = 0
+        self._shown_from_pass = self._passes_opened = self.level = 0
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
 
@@ -119,6 +132,11 @@ class Renderer:
             self._fallback_view.upload(*field.grid.centre, view.colors, view.disparity)
         self._accumulation = None
 
+    def set_hidden(self, surface: HiddenSurface | None) -> None:
+        """Show this surface behind the centre view's through an open lens; None: no surface."""
+        self._loaded.set_hidden(surface)
+        self._accumulation = None
+
     def set_gloss(self, maps: GlossMaps | None) -> None:
         """Use these maps for optics with gloss; None if there are none."""
         self._loaded.set_gloss(maps)
@@ -132,8 +150,9 @@ class Renderer:
         level: its scale is ignored. part: part of the picture, stretched to size_px = (width, height). Before the first
         view the picture is black. Its framebuffer stays bound.
         """
-        self._accumulation, self._shown_from_pass = self._accumulation_of(optics, size_px, level, part), 0
+        self._begin(self._accumulation_of(optics, size_px, level, part))
         self._draw(math.inf, passes=1)
+        self._open_lens(math.inf)
         self._finish()
 
     def render_in_time(
@@ -157,7 +176,7 @@ class Renderer:
         drawn = self._current
         self._refining_s = seconds / max(drawn.done, 1) / math.prod(drawn.size_px)
         if quality != BEST_QUALITY:
-            self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
+            self._begin(self._accumulation_of(optics, size_px, BEST_QUALITY, part))
             self.passes_shown = 0
         self._report(drawn.done, seconds)
 
@@ -168,22 +187,27 @@ class Renderer:
         Views that come in between are drawn in the passes that follow, so that they do not delay the new picture.
         """
         self.passes_shown = 0 if is_coarse else self.passes_shown
-        self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
-        self._shown_from_pass = min(self.passes_shown, self._accumulation.passes)
+        self._begin(self._accumulation_of(optics, size_px, BEST_QUALITY, part))
+        self._shown_from_pass = min(self.passes_shown, self._current.passes)
 
     def refine(self, budget_s: float = math.inf) -> None:
         """Draw more samples of the same picture, for about that long; the image changes after each pass."""
         if self.is_converged:
             return
         accumulation, programs, start = self._current, len(self.programs), time.perf_counter()
-        pass_before, done_before = accumulation.pass_index, accumulation.done
-        self._draw(budget_s, accumulation.passes)
-        if accumulation.pass_index > pass_before and not self.is_renewing:
+        passes_before, done_before = self._passes_ready, accumulation.done
+        if not accumulation.is_complete:
+            self._draw(budget_s, accumulation.passes)
+            self.ctx.finish()
+            if len(self.programs) == programs:
+                sampled_s = (time.perf_counter() - start) / max(accumulation.done - done_before, 1)
+                self._refining_s = sampled_s / math.prod(accumulation.size_px)
+        if accumulation.is_complete:
+            self._open_lens(start + budget_s - time.perf_counter())
+        if self._passes_ready > passes_before and not self.is_renewing:
             self._finish()
         self.ctx.finish()
         seconds = time.perf_counter() - start
-        if len(self.programs) == programs:
-            self._refining_s = seconds / max(accumulation.done - done_before, 1) / math.prod(accumulation.size_px)
         if not self.is_renewing:
             self._report(accumulation.done, seconds)
 
@@ -199,21 +223,23 @@ class Renderer:
         return PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space)
 
     def _start_tile(self, settings: RenderSettings, tile: LensTile) -> PictureDrawing:
-        """Return a picture of the tile's own views."""
-        first, *others = tile.views
-        height, width = first.colors.shape[:2]
-        field = LightFieldTexture(self.ctx, tile.grid, width, height, hdr=True, with_disparity=True)
+        """Return a picture of the tile's own view."""
+        height, width = tile.view.colors.shape[:2]
+        field = LightFieldTexture(self.ctx, GridShape(1, 1), width, height, hdr=True, with_disparity=True)
         field.color_space = settings.color_space
-        field.upload(first.row, first.column, first.colors, first.disparity)
+        field.upload(0, 0, tile.view.colors, tile.view.disparity)
         whole_width_px = settings.size_px.width / settings.part.width
+        field.set_hidden(tile.hidden)
         lens = replace(
-            lens_of(settings.optics, field, round(whole_width_px * tile.window.width), widest=math.inf),
+            lens_of(settings.optics, field, round(whole_width_px * tile.window.width)),
             highlight_gain=tile.highlight_gain,
             part=settings.part,
             field_part=tile.window,
+            hidden_scale=tile.hidden_scale,
+            behind_eye=tile.behind_eye,
         )
         whole = ProgressiveAccumulation(lens, settings.size_px, lens.pass_count(field))
-        drawing = PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space, others)
+        drawing = PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space)
         field.release()
         return drawing
 
@@ -227,12 +253,12 @@ class Renderer:
     @property
     def is_converged(self) -> bool:
         """Whether more samples would not make the picture better."""
-        return self._accumulation is None or self._accumulation.is_complete
+        return self._accumulation is None or self._passes_ready == self._accumulation.passes
 
     @property
     def is_renewing(self) -> bool:
         """Whether the picture that `renew` has begun is not shown yet."""
-        return self._accumulation is not None and self._accumulation.pass_index < self._shown_from_pass
+        return self._accumulation is not None and self._passes_ready < self._shown_from_pass
 
     @property
     def image_texture(self) -> int:
@@ -265,6 +291,9 @@ class Renderer:
         if self._shares is None:
             self.programs.release()
         self._accumulator.release()
+        self._discs.release()
+        if self._pinhole is not None:
+            self._pinhole.release()
         self._targets.release()
         for field in (self.field, self._fallback_view):
             if field is not None:
@@ -290,25 +319,68 @@ class Renderer:
     ) -> ProgressiveAccumulation:
         field = field or self.drawn_field
         lens = replace(lens_of(optics, field, round(size_px[0] / part.width), level), part=part)
-        return ProgressiveAccumulation(lens, size_px, lens.pass_count(field))
+        return ProgressiveAccumulation(lens, ScreenSize(*size_px), lens.pass_count(field))
+
+    def _begin(self, accumulation: ProgressiveAccumulation) -> None:
+        self._accumulation, self._opening = accumulation, None
+        self._shown_from_pass = self._passes_opened = 0
+
+    @property
+    def _passes_ready(self) -> int:
+        """Number of passes that the picture being drawn can show."""
+        accumulation = self._current
+        return self._passes_opened if accumulation.lens.slices else accumulation.pass_index
 
     def _draw(self, budget_s: float, passes: int) -> None:
         accumulation = self._current
         sample_s = self._refining_s * math.prod(accumulation.size_px)
-        targets = self._targets.get(accumulation.size_px)
-        self._accumulator.sum_up(self.drawn_field, accumulation, targets, passes, budget_s, sample_s)
+        if accumulation.lens.slices:
+            target = self._pinhole_targets(accumulation.drawn_px).light.framebuffer
+        else:
+            target = self._targets.get(accumulation.size_px).light.framebuffer
+        self._accumulator.sum_up(self.drawn_field, accumulation, target, passes, budget_s, sample_s)
+
+    def _pinhole_targets(self, size_px: ScreenSize) -> PinholeTargets:
+        if self._pinhole is None or self._pinhole.size_px != size_px:
+            if self._pinhole is not None:
+                self._pinhole.release()
+            self._pinhole = PinholeTargets(self.ctx, size_px)
+        return self._pinhole
+
+    def _open_lens(self, budget_s: float) -> None:
+        """Blur the pinhole's picture as an open lens does, for about that long."""
+        accumulation, end = self._current, time.perf_counter() + budget_s
+        if not accumulation.lens.slices:
+            return
+        if self._opening is None:
+            pinhole, target = self._pinhole_targets(accumulation.drawn_px), self._targets.get(accumulation.size_px)
+            self._accumulator.draw_disparity(self.drawn_field, accumulation, pinhole.seen.framebuffer)
+            self._opening = self._discs.steps(
+                self.drawn_field,
+                accumulation.lens,
+                pinhole.light.texture,
+                pinhole.seen.texture,
+                target.light.framebuffer,
+            )
+        for _ in self._opening:
+            if budget_s < math.inf:
+                self.ctx.finish()
+            if time.perf_counter() >= end:
+                return
+        self._opening, self._passes_opened = None, accumulation.pass_index
 
     def _finish(self) -> None:
         self._targets.shown = targets = self._targets.get(self._current.size_px)
         if self._shares is None:
             self._accumulator.passes.present(self._current.lens, targets)
-        self.passes_shown = self._current.pass_index
+        self.passes_shown = self._passes_ready
 
     def _fetches(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> float:
         field = self.drawn_field
         lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), level)
         pixels = math.prod(scale_size(size_px, level.scale))
-        return fetches_of(lens.sample_count(field), pixels, bool(field.has_disparity.any()))
+        fetches = fetches_of(lens.sample_count(field), pixels, bool(field.has_disparity.any()))
+        return fetches + (OPEN_FETCHES * pixels if lens.slices else 0.0)
 
     def _report(self, samples: int, seconds: float) -> None:
         """Keep the numbers of the last picture."""

@@ -31,7 +31,7 @@ STRENGTH_TIP = "Depth of the scene: more depth moves and blurs near and far obje
 
 def essentials(state: AppState, scene: Scene) -> list[Action]:
     """Build the rows. A single view has no focus, aperture or loop."""
-    has_views = bool(aperture_limit(scene.grid))
+    has_views = bool(aperture_limit(scene))
     actions: list[Action] = []
     if has_views:
         preset = choices(PRESETS, [active_preset(state, scene)])

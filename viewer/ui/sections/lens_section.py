@@ -95,7 +95,7 @@ def _distance(state: AppState, scene: Scene) -> list[Action]:
 
 def aperture_slider(state: AppState, scene: Scene) -> list[Action]:
     """Build the aperture slider, in stops like the ring of a lens: a pinhole at the left, wide open at the right."""
-    diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
+    diameter, widest = state.optics.aperture_diameter, aperture_limit(scene)
     words, is_exact = units.f_number_text(scene, diameter), units.f_number(scene, widest) is not None
     exact_tip = METRIC_TIP if scene.inverse_metres is not None else F_NUMBER_TIP.format(units.ASSUMED_DISTANCE_M)
     tip = APERTURE_TIP + (exact_tip if is_exact else EQUIVALENT_TIP)
