@@ -11,7 +11,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.depth.multi_view.matching import FINDING, STEP_PX, MatchingViews, matching_views, sweep
-from iibr_core.depth.multi_view.plain_areas import find_stripes, move_plain_areas_back
+from iibr_core.depth.multi_view.plain_areas import find_stripes, lean_stripes, move_plain_areas_back
 from iibr_core.depth.multi_view.refinement import refine_by_gradients
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
@@ -23,6 +23,10 @@ SMALL_SIDE_PX = 160
 """Longer side of the small copy."""
 MAX_STEPS = 512
 """Largest number of disparities of a sweep; a wider range is swept more coarsely."""
+FEW_VIEWS_STEP = 2 / 3
+"""Share of the usual number of disparities that few views are matched at."""
+MIN_SURENESS = 0.4
+"""Least sureness of a surface that others are compared with."""
 FEW_VIEWS = 4
 """Number of views up to which many places match by chance, so that maps are checked against each other."""
 
@@ -41,6 +45,24 @@ def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
     views: (H, W, 3) each, of equal size. offsets: their viewpoints, from any origin. reference: an index. Reports no
     progress. Raises InputError if all views have the same viewpoint or are too small.
     """
+    small, shrink, disparities = _small_copy(views, offsets, reference)
+    size, step = image_size(views[reference]), float(disparities[1] - disparities[0])
+    with watched(ignore_progress):
+        matched = _match(small, disparities)
+        values, is_sure = matched.values, (matched.sureness >= MIN_SURENESS) & ~matched.is_plain
+        if len(views) <= FEW_VIEWS:
+            is_sure &= left_right_check(views, offsets, reference, values, disparities, shrink)
+    # A few sure pixels at either end may be mistaken, and a few steps beyond them may be needed.
+    low, high = np.quantile(values[is_sure] if is_sure.any() else values, [0.002, 0.998])
+    margin = 4 * step
+    whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
+    return CoarseDisparity(whole, (float(low - margin) * shrink, float(high + margin) * shrink))
+
+
+def _small_copy(
+    views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int
+) -> tuple[MatchingViews, int, NDArray[np.float32]]:
+    """Return views that are a whole number of times smaller, that number, and all disparities to try, in their px."""
     size = image_size(views[reference])
     shrink = -(-max(size) // SMALL_SIDE_PX)
     if min(size) // shrink < 8:
@@ -49,17 +71,7 @@ def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
     step = STEP_PX / small.reach
     # The farthest view may be shifted by 0.4 of the longer side.
     largest = 0.4 * max(small.luma.shape) / small.reach
-    disparities = np.arange(-largest, largest + step, step, dtype=np.float32)
-    with watched(ignore_progress):
-        matched = _match(small, disparities)
-        values, is_sure = matched.values, (matched.sureness >= 0.4) & ~matched.is_plain
-        if len(views) <= FEW_VIEWS:
-            is_sure &= left_right_check(views, offsets, reference, values, disparities, shrink)
-    # A few sure pixels at either end may be mistaken, and a few steps beyond them may be needed.
-    low, high = np.quantile(values[is_sure] if is_sure.any() else values, [0.002, 0.998])
-    margin = 4 * step
-    whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
-    return CoarseDisparity(whole, (float(low - margin) * shrink, float(high + margin) * shrink))
+    return small, shrink, np.arange(-largest, largest + step, step, dtype=np.float32)
 
 
 def estimate_disparity(
@@ -77,8 +89,9 @@ def estimate_with_doubt(
 ) -> tuple[FloatImage, NDArray[np.bool_]]:
     """Return the same, and where it is in doubt (H, W): in plain and in striped areas, which match anywhere."""
     matched = matching_views(views, offsets, reference)
-    disparities = np.linspace(*range_px, _steps(range_px, matched.reach) + 1, dtype=np.float32)
     is_checked = len(views) <= FEW_VIEWS
+    steps = _steps(range_px, matched.reach * (FEW_VIEWS_STEP if is_checked else 1))
+    disparities = np.linspace(*range_px, steps + 1, dtype=np.float32)
     # The last part is refinement.
     parts = 2 + is_checked
     with part_of_job(0, 1, parts):
@@ -91,7 +104,11 @@ def estimate_with_doubt(
             values = fill_disparity_by_color(matched.colors, np.where(is_seen, values, np.float32(np.nan)))
     refined = np.clip(refine_by_gradients(matched, values), *range_px)
     report_progress(parts, parts, FINDING)
-    return refined, found.is_plain | found.is_striped
+    # What repeats itself may do so outside of the range.
+    small, _, every = _small_copy(views, offsets, reference)
+    with watched(ignore_progress):
+        repeats = find_stripes(sweep(small, every))[0].astype(np.float32)
+    return refined, found.is_plain | found.is_striped | (resample_surfaces(repeats, image_size(refined)) > 0.5)
 
 
 def left_right_check(
@@ -154,11 +171,18 @@ class _Match(NamedTuple):
 def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> _Match:
     """Match every pixel; a median smooths single pixels away."""
     costs = sweep(views, disparities)
-    is_striped = find_stripes(costs)
-    values, sureness = choose_disparity(costs, views.luma, disparities, is_striped)
+    is_striped, limits = find_stripes(costs)
+    if is_striped.any():
+        # First without the costs of stripes: the surfaces around them reach across. 0 decides at equal distance.
+        blank = np.where(is_striped[..., None], np.uint8(0), costs)
+        near = choose_disparity(blank, views.colors, disparities, is_striped)[0] * (not is_striped.all())
+        margin = 2 * (disparities[1] - disparities[0])
+        lean_stripes(costs, is_striped, limits, disparities, near - np.clip(near, -margin, margin))
+    values, sureness = choose_disparity(costs, views.colors, disparities, is_striped)
     is_plain = move_plain_areas_back(costs, views.colors, disparities, values, len(views.textures))
     image = oiio.ImageBuf(np.ascontiguousarray(values[..., None]))
-    median = oiio.ImageBufAlgo.median_filter(image, 5, 5).get_pixels(oiio.FLOAT)
+    side = 5 if len(views.textures) <= FEW_VIEWS else 3
+    median = oiio.ImageBufAlgo.median_filter(image, side, side).get_pixels(oiio.FLOAT)
     smooth = np.asarray(median, np.float32).reshape(values.shape)
     return _Match(smooth, sureness, is_plain, is_striped)
 

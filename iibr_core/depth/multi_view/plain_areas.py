@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from iibr_core.depth.multi_view.matching import HIDDEN_FACTOR
 from iibr_core.runtime.kernels import kernel
@@ -21,6 +22,12 @@ UNSEEN_COST = 255
 """Cost of disparities at which too few views see a pixel; hardly any other costs as much."""
 STRIPE_RATIO = 2
 """Ratio of a cost to that of a match, between two matches of a stripe."""
+MATCH_SHARE = 0.25
+"""Share of the mean cost that a match of a stripe may have: errors of resampling are large there."""
+STRIPE_PX = 7
+"""Side of the squares, in pixels, in which most pixels match several times."""
+LEAN_STEPS, MAX_LEAN = 2, 60
+"""Steps of disparity that cost a stripe as much as a difference of 1 of 255, and the largest such cost."""
 PLAIN_REFUTED, SIDE_REFUTED = 0.1, 0.6
 """Largest share of all disparities that do not match at a pixel of a plain area; the same at its borders."""
 MAX_COLOR_STEP = 0.03
@@ -56,31 +63,49 @@ def move_plain_areas_back(
     return is_plain
 
 
-def find_stripes(costs: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Return which pixels (H, W) match at several disparities with others between them that do not, as stripes do."""
-    is_striped = np.zeros(costs.shape[:2], np.bool_)
-    _find_stripes(costs, is_striped)
-    return is_striped
+def find_stripes(costs: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
+    """Return which pixels (H, W) lie where most match at several disparities with others between them that do not, as
+    stripes and patterns do, and the largest cost of a match at each pixel (H, W).
+    """
+    matches, limits = np.empty(costs.shape[:2], np.float32), np.empty(costs.shape[:2], np.uint8)
+    _count_matches(costs, matches, limits)
+    return uniform_filter(np.float32(matches > 1), STRIPE_PX) > 0.5, limits
 
 
 @kernel
-def _find_stripes(costs, is_striped):
-    """Mark pixels with two low costs or more, parted by costs that are STRIPE_RATIO times as high."""
+def _count_matches(costs, matches, limits):
+    """Fill the number of low costs of each pixel that are parted by costs STRIPE_RATIO times as high, and the limit."""
     height, width, count = costs.shape
     for y in range(height):
         for x in range(width):
-            lowest = np.uint8(UNSEEN_COST)
+            mean, seen, lowest = np.float32(0), 0, np.uint8(UNSEEN_COST)
             for index in range(count):
-                lowest = min(lowest, costs[y, x, index])
-            low = max(int(lowest) + 2, MIN_LIMIT)
-            matches, is_low = 0, False
+                if costs[y, x, index] != UNSEEN_COST:
+                    lowest = min(lowest, costs[y, x, index])
+                    mean += costs[y, x, index]
+                    seen += 1
+            low = max(MATCH_SHARE * mean / max(seen, 1), np.float32(lowest + 2), np.float32(MIN_LIMIT))
+            number, is_low = 0, False
             for index in range(count):
                 cost = costs[y, x, index]
                 if cost <= low and not is_low:
-                    matches, is_low = matches + 1, True
+                    number, is_low = number + 1, True
                 elif cost > STRIPE_RATIO * low:
                     is_low = False
-            is_striped[y, x] = matches > 1
+            matches[y, x], limits[y, x] = number, min(low, UNSEEN_COST)
+
+
+@kernel
+def lean_stripes(costs, is_striped, limits, disparities, near):
+    """Let stripes cost the same at all of their matches, and a little more with the distance from a map (H, W)."""
+    height, width, count = costs.shape
+    for y in range(height):
+        for x in range(width):
+            if is_striped[y, x]:
+                at = (near[y, x] - disparities[0]) / (disparities[1] - disparities[0])
+                for index in range(count):
+                    lean = min(abs(index - at) / LEAN_STEPS, np.float32(MAX_LEAN))
+                    costs[y, x, index] = np.uint8(min(max(costs[y, x, index], limits[y, x]) + lean, UNSEEN_COST))
 
 
 @kernel

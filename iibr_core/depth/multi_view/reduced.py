@@ -51,7 +51,7 @@ def _doubt(is_doubtful: NDArray[np.bool_]) -> tuple[str, ...]:
     share = float(is_doubtful.mean())
     if share < MIN_NOTED_DOUBT:
         return ()
-    return (f"{share:.0%} of the picture is plain or striped: its depth is that of the surfaces around it.",)
+    return (f"{share:.0%} of the picture is plain or repeats itself: its depth is that of the surfaces around it.",)
 
 
 def _matched_size(

@@ -13,12 +13,12 @@ from iibr_core.runtime.tiling import in_bands
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 
-HIDDEN_DIFFERENCE = 0.02
+HIDDEN_DIFFERENCE = 0.01
 """Difference of texture (1 = white) at which a view weighs a quarter, as hidden (weights of Geman and McClure)."""
 SMOOTHNESS = 1e-2
 """Weight of bends of the map."""
-EDGE_LUMA = 0.05
-"""Edge of the picture (1 = white) at which bends weigh a third."""
+EDGE_COLOR = 0.05
+"""Edge of a channel (1 = white) at which bends weigh a third."""
 EDGE_DISPARITY = 0.1
 """Bend of the map (px per view step) that weighs a quarter, as an edge."""
 ROUNDS = 3
@@ -39,8 +39,8 @@ def refine_by_gradients(views: MatchingViews, disparity: FloatImage) -> FloatIma
         in_bands(measure, size)
         target = disparity + np.clip(-pull / (curvature + EPSILON), -longest, longest)
         across, down = np.zeros(size, np.float32), np.zeros(size, np.float32)
-        _weigh_bends(views.luma, disparity, across)
-        _weigh_bends(views.luma.T, disparity.T, down.T)
+        _weigh_bends(views.colors, disparity, across)
+        _weigh_bends(views.colors.swapaxes(0, 1), disparity.T, down.T)
         disparity = _smooth(disparity, target, curvature, across, down)
     return disparity
 
@@ -121,14 +121,17 @@ def _measure(textures, offsets, disparity, first, last, curvature, pull):
 
 
 @kernel
-def _weigh_bends(luma, disparity, weights):
+def _weigh_bends(colors, disparity, weights):
     """Fill the weights of each pixel's second difference along its row; 0 stays at the borders."""
     height, width = disparity.shape
     for y in range(height):
         for x in range(1, width - 1):
-            edge = max(abs(luma[y, x] - luma[y, x - 1]), abs(luma[y, x + 1] - luma[y, x]))
+            edge = np.float32(0)
+            for channel in range(3):
+                before, here, after = colors[y, x - 1, channel], colors[y, x, channel], colors[y, x + 1, channel]
+                edge = max(edge, max(abs(here - before), abs(after - here)))
             bend = (disparity[y, x - 1] - 2 * disparity[y, x] + disparity[y, x + 1]) / np.float32(EDGE_DISPARITY)
-            weights[y, x] = np.float32(SMOOTHNESS) * np.exp(-edge / np.float32(EDGE_LUMA)) / (1 + bend * bend) ** 2
+            weights[y, x] = np.float32(SMOOTHNESS) * np.exp(-edge / np.float32(EDGE_COLOR)) / (1 + bend * bend) ** 2
 
 
 @kernel

@@ -17,20 +17,20 @@ STEP_COST = 8
 """Cost of one step of disparity between neighbouring pixels, where costs of matching end at 255."""
 JUMP_COST = 240
 """Cost of a larger step, where the picture has no edge."""
-EDGE_LUMA = 0.02
-"""Edge of the picture (1 = white) at which a jump costs a third."""
+EDGE_COLOR = 0.02
+"""Edge of a channel (1 = white) at which a jump costs a third."""
 UNREACHED = 30_000
 """Cost above those of all paths."""
 
 
 def choose_disparity(
-    costs: NDArray[np.uint8], luma: FloatImage, disparities: NDArray[np.float32], is_striped: NDArray[np.bool_]
+    costs: NDArray[np.uint8], colors: FloatImage, disparities: NDArray[np.float32], is_striped: NDArray[np.bool_]
 ) -> tuple[FloatImage, FloatImage]:
     """Return the disparity (H, W) that suits each pixel and its neighbours, and its sureness (H, W), 0 .. 1.
 
-    costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1. is_striped:
-    pixels (H, W) whose edges are those of stripes, not of surfaces. The result lies between two disparities, at the
-    lowest point of a parabola. A pixel is sure if its disparity costs far less than the mean of all.
+    costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. colors: (H, W, 3), 0 .. 1. is_striped:
+    pixels (H, W) whose edges are those of stripes, not of surfaces. The result lies between two disparities, where
+    two lines of one slope through its neighbours meet. A pixel is sure if its disparity costs far less than the mean.
     """
     directions = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
     halves = np.zeros((2, *costs.shape), np.uint16)
@@ -38,17 +38,17 @@ def choose_disparity(
     def sum_paths(half: int) -> None:
         for down, across in directions[half::2]:
             raise_if_stopped()
-            _add_path(costs, luma, is_striped, down, across, halves[half])
+            _add_path(costs, colors, is_striped, down, across, halves[half])
 
     in_pieces(sum_paths, range(2), tiling.THREADS)
     halves[0] += halves[1]
-    values, sureness = np.empty(luma.shape, np.float32), np.empty(luma.shape, np.float32)
+    values, sureness = np.empty(costs.shape[:2], np.float32), np.empty(costs.shape[:2], np.float32)
     _choose(halves[0], costs, disparities, values, sureness)
     return values, sureness
 
 
 @kernel
-def _add_path(costs, luma, is_striped, down, across, sums):
+def _add_path(costs, colors, is_striped, down, across, sums):
     """Add the costs of the cheapest path that comes from one direction (equation 13 of the paper).
 
     Stripes are no edges. Loops over disparities have no branches, so that one instruction takes several of them.
@@ -65,8 +65,10 @@ def _add_path(costs, luma, is_striped, down, across, sums):
             v, u = y - down, x - across
             cost, path, total = costs[y, x], current[x], sums[y, x]
             if v >= 0 and v < height and u >= 0 and u < width:
-                edge = np.float32(0) if is_striped[y, x] and is_striped[v, u] else abs(luma[y, x] - luma[v, u])
-                jump = max(np.float32(STEP_COST), np.float32(JUMP_COST) * np.exp(-edge / np.float32(EDGE_LUMA)))
+                edge = np.float32(0)
+                for channel in range(3 if not (is_striped[y, x] and is_striped[v, u]) else 0):
+                    edge = max(edge, abs(colors[y, x, channel] - colors[v, u, channel]))
+                jump = max(np.float32(STEP_COST), np.float32(JUMP_COST) * np.exp(-edge / np.float32(EDGE_COLOR)))
                 source, lowest = before[u], before_min[u]
                 limit = np.uint16(lowest + np.uint16(jump + np.float32(0.5)))
                 for index in range(count):
@@ -87,7 +89,7 @@ def _add_path(costs, luma, is_striped, down, across, sums):
 
 @kernel
 def _choose(sums, costs, disparities, values, sureness):
-    """Take the disparity with the lowest sum, moved to the lowest point of the parabola there."""
+    """Take the disparity with the lowest sum, moved to where two lines of one slope meet."""
     height, width, count = costs.shape
     for y in range(height):
         for x in range(width):
@@ -101,6 +103,6 @@ def _choose(sums, costs, disparities, values, sureness):
             values[y, x] = disparities[best]
             if best > 0 and best < count - 1:
                 below, above = np.float32(totals[best - 1]), np.float32(totals[best + 1])
-                bend = below - 2 * np.float32(totals[best]) + above
+                bend = max(below, above) - np.float32(totals[best])
                 if bend > 0:
                     values[y, x] += (disparities[1] - disparities[0]) * np.float32(0.5) * (below - above) / bend

@@ -14,8 +14,17 @@ from iibr_core.depth.multi_view.matching import (
     _store_costs,
     view_groups,
 )
+from iibr_core.depth.multi_view.plain_areas import (
+    LEAN_STEPS,
+    MATCH_SHARE,
+    MAX_LEAN,
+    MIN_LIMIT,
+    STRIPE_RATIO,
+    _count_matches,
+    lean_stripes,
+)
 from iibr_core.depth.multi_view.refinement import _apply, _diagonal, _measure, _smooth
-from iibr_core.depth.multi_view.semi_global import EDGE_LUMA, JUMP_COST, STEP_COST, choose_disparity
+from iibr_core.depth.multi_view.semi_global import EDGE_COLOR, JUMP_COST, STEP_COST, choose_disparity
 from tests.iibr_core.scenes import smooth_texture
 
 
@@ -80,7 +89,7 @@ def test_views_are_hidden_where_the_other_half_matches_much_better():
     np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_TEXTURE_DIFFERENCE, 1), atol=1.01)
 
 
-def slow_sums(costs, luma, is_striped):
+def slow_sums(costs, colors, is_striped):
     """Return the sums of all paths (equation 13), with whole costs of jumps."""
     height, width, count = costs.shape
     sums = np.zeros(costs.shape)
@@ -95,8 +104,8 @@ def slow_sums(costs, luma, is_striped):
                 if not (0 <= v < height and 0 <= u < width):
                     continue
                 lowest = paths[v, u].min()
-                edge = 0 if is_striped[y, x] and is_striped[v, u] else abs(luma[y, x] - luma[v, u])
-                jump = np.floor(max(STEP_COST, JUMP_COST * np.exp(-edge / EDGE_LUMA)) + 0.5)
+                edge = 0 if is_striped[y, x] and is_striped[v, u] else np.abs(colors[y, x] - colors[v, u]).max()
+                jump = np.floor(max(STEP_COST, JUMP_COST * np.exp(-edge / EDGE_COLOR)) + 0.5)
                 for d in range(count):
                     beside = [paths[v, u, e] + STEP_COST for e in (d - 1, d + 1) if 0 <= e < count]
                     paths[y, x, d] += min(paths[v, u, d], *beside, lowest + jump) - lowest
@@ -107,20 +116,20 @@ def slow_sums(costs, luma, is_striped):
 def test_disparities_are_the_cheapest_of_all_paths_and_lie_between_steps():
     rng = np.random.default_rng(4)
     costs = rng.integers(0, 256, (7, 9, 6)).astype(np.uint8)
-    luma = (0.1 * rng.random((7, 9))).astype(np.float32)
+    colors = (0.06 * rng.random((7, 9, 3))).astype(np.float32)
     disparities = np.linspace(-1.0, 1.5, 6).astype(np.float32)
     is_striped = rng.random((7, 9)) < 0.4
-    values, sureness = choose_disparity(costs, luma, disparities, is_striped)
-    sums = slow_sums(costs.astype(float), luma.astype(float), is_striped)
+    values, sureness = choose_disparity(costs, colors, disparities, is_striped)
+    sums = slow_sums(costs.astype(float), colors.astype(float), is_striped)
     inner = 0
     for y, x in np.ndindex(7, 9):
         best = int(np.argmin(sums[y, x]))
         expected = disparities[best]
         if 0 < best < 5:
             below, least, above = sums[y, x, best - 1 : best + 2]
-            # The lowest point of the parabola through three sums.
-            a, b, _ = np.polyfit([-1, 0, 1], [below, least, above], 2)
-            expected, inner = expected - 0.5 * b / (2 * a) if a > 0 else expected, inner + 1
+            # Two lines of one slope, the steeper one's, meet where both sides are equally far above them.
+            slope = max(below, above) - least
+            expected, inner = expected + 0.5 * (below - above) / (2 * slope) if slope > 0 else expected, inner + 1
         # A sum that float32 rounds the other way is one of hundreds.
         assert abs(values[y, x] - expected) < 0.02
         mean = costs[y, x].mean()
@@ -166,3 +175,24 @@ def test_curvature_and_pull_lead_to_the_disparity_at_which_views_agree():
     _measure(textures, offsets, start, 0, 12, curvature, pull)
     inside = np.s_[2:-2, 2:-2]
     np.testing.assert_allclose(start[inside] - pull[inside] / curvature[inside], truth, atol=2e-3)
+
+
+def test_stripes_are_pixels_with_parted_matches_and_lean_to_a_map():
+    """Slow twins: counts by runs of low costs, leaning by the formula."""
+    rng = np.random.default_rng(6)
+    costs = rng.choice([2, 20, 60, 200, 255], (5, 6, 9)).astype(np.uint8)
+    matches, limits = np.empty((5, 6), np.float32), np.empty((5, 6), np.uint8)
+    _count_matches(costs, matches, limits)
+    for y, x in np.ndindex(5, 6):
+        values = costs[y, x].astype(float)
+        seen = values[values < 255]
+        low = max(MATCH_SHARE * seen.mean(), seen.min() + 2, MIN_LIMIT)
+        marks = "".join("m" if value <= low else "-" if value > STRIPE_RATIO * low else "" for value in values)
+        assert matches[y, x] == len([run for run in marks.split("-") if run])
+        assert limits[y, x] == int(low)
+    is_striped, near = rng.random((5, 6)) < 0.5, rng.uniform(-1, 3, (5, 6)).astype(np.float32)
+    disparities, leaned = np.linspace(-1, 3, 9, dtype=np.float32), costs.copy()
+    lean_stripes(leaned, is_striped, limits, disparities, near)
+    lean = np.minimum(np.abs(disparities - near[..., None]) / 0.5 / LEAN_STEPS, MAX_LEAN)
+    expected = np.minimum(np.maximum(costs, limits[..., None]) + lean, 255).astype(np.uint8)
+    assert (np.abs(leaned.astype(int) - np.where(is_striped[..., None], expected, costs)) <= 1).all()

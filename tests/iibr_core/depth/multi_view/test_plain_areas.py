@@ -73,3 +73,17 @@ def test_stripes_stay_smooth_and_are_in_doubt():
     assert np.abs(values[24:72, 40:104] - 1.5).max() < 0.3
     assert is_doubtful[24:72, 40:104].mean() > 0.5
     assert is_doubtful[:16].mean() < 0.05
+
+
+@pytest.mark.parametrize("wall", [0, 6])
+def test_a_patterned_wall_takes_the_match_nearest_to_what_is_sure(wall):
+    """A wall that repeats itself every 24 px, and a square 12 px nearer: the wall fits at wall + 24 n, too."""
+    pattern = np.tile(textured((96, 24), 4), (1, 12, 1))
+    left, right = pattern[:, 24:168].copy(), pattern[:, 24 + wall : 168 + wall].copy()
+    square = textured((40, 40), 5)
+    left[30:70, 70:110] = right[30:70, 70 - wall - 12 : 110 - wall - 12] = square
+    values, is_doubtful = estimate_with_doubt([left, right], PAIR, 0, estimate_coarse([left, right], PAIR, 0).range_px)
+    assert np.median(np.abs(values[40:60, 80:100] - wall - 12)) < 0.5
+    assert np.mean(np.abs(values[:24, 24:-24] - wall) > 1) < 0.1
+    assert is_doubtful[:24].mean() > 0.8
+    assert is_doubtful[40:60, 80:100].mean() < 0.1
