@@ -6,11 +6,9 @@ import pytest
 from benchmarks.compare import changes_table, compare, judge_view, main, mean_table, plot, scene_table
 from benchmarks.guess import ordered_share, table
 from benchmarks.scenes import MAPS, Scene, data_scenes, drawn_scene, offsets_of, with_map
-from benchmarks.ways import WAYS, chosen_ways, land
-from iibr_core.evaluation.warp import reference_warp
+from benchmarks.ways import WAYS, chosen_ways
 from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
-from tests.iibr_core.scenes import square_before_wall
 
 OTHERS = pytest.mark.parametrize("name", [name for name in WAYS if not name.startswith(("iibr", "unchanged"))])
 
@@ -35,16 +33,6 @@ def test_the_foreground_hides_the_background(name) -> None:
     assert view[13:27, 15:19].min() > 0.95, "the square, moved to the left by 8 px"
     assert view[13:27, :9].max() < 0.05
     assert view[:6].max() < 0.05
-
-
-@pytest.mark.parametrize("offset", [ViewOffset(0.0, 1.0), ViewOffset(-1.3, 0.4), ViewOffset(2.0, -2.0)])
-def test_the_plain_warp_lands_what_the_reference_does(offset) -> None:
-    photo, wall = square_before_wall(40, 60, 3.0)
-    slope = (wall.values + 0.02 * np.arange(60)).astype(np.float32)
-    (nearest, hole), expected = land(slope, offset), reference_warp(photo.pixels, slope, offset)
-    np.testing.assert_array_equal(hole, expected.hole)
-    np.testing.assert_allclose(nearest[~hole], expected.disparity[~hole], atol=1e-4)
-    assert 0 < hole.mean() < 0.5
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MAPS if kind != "exact"])

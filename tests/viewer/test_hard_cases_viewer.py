@@ -6,11 +6,9 @@ See also test_preferences_store.py, gpu/test_light_field_texture.py and gpu/test
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,6 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.formats.images.open_picture import settings_text_in
-from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.scenes.opening import results_of
@@ -26,7 +23,6 @@ from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
-from viewer.app.picture_files import export_picture, shot_of
 from viewer.background.newest import Failed
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
@@ -34,17 +30,6 @@ from viewer.model.action import do
 from viewer.model.saved_settings import read_settings
 
 GRID = GridShape(3, 3)
-
-
-@contextmanager
-def full_disk(room: int) -> Iterator[None]:
-    """Files cannot grow beyond this many bytes."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.fixture
@@ -69,25 +54,6 @@ def goes_on(desk: Desk, folder: Path, generation: int) -> None:
     desk.thread.submit(SceneRequest(generation, Source(str(photo), grid=GridShape(1, 2))))
     while not (isinstance(result := desk.next(), ViewReady) and result.progress.done == 2):
         assert not isinstance(result, Failed)
-
-
-@pytest.mark.parametrize(
-    ("damage", "reason"),
-    [
-        (Path.unlink, "no such file"),
-        (lambda path: path.write_bytes(path.read_bytes()[:-40]), "cut off"),
-    ],
-    ids=["deleted", "cut off"],
-)
-def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
-    desk: Desk, tmp_path: Path, damage: Callable[[Path], None], reason: str
-) -> None:
-    photo = write_scene(tmp_path)
-    damage(photo)
-    message = failure(desk, SceneRequest(1, Source(str(photo))))
-    assert "scene.png" in message
-    assert reason in message
-    goes_on(desk, tmp_path, 2)
 
 
 def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(
@@ -125,42 +91,11 @@ def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) 
     goes_on(desk, tmp_path, 3)
 
 
-@pytest.mark.parametrize("size", [(1, 1), (5, 13)])
-def test_photos_of_any_size_and_depth_become_scenes(tmp_path: Path, size: tuple[int, int]) -> None:
-    """With a map of NaN, infinity, an outlier and negative values beside them."""
-    random = np.random.default_rng(0)
-    write_image(tmp_path / "a.png", random.integers(0, 256, (*size, 3), dtype=np.uint8))
-    values = random.uniform(-3, 3, size).astype(np.float32)
-    values.flat[: min(values.size - 1, 4)] = [np.nan, np.inf, 1e6, -np.inf][: values.size - 1]
-    np.save(tmp_path / "a_disparity.npy", values)
-    results = list(results_of(SceneRequest(1, Source(str(tmp_path / "a.png"), grid=GRID)), lambda: CENTRE))
-    assert isinstance(results[0], SceneReady)
-    views = [result.view for result in results if isinstance(result, ViewReady)]
-    assert sum(view.is_final for view in views) == 9
-    assert all(view.disparity is not None and np.isfinite(view.disparity).all() for view in views)
-
-
 @pytest.fixture
 def viewer(tmp_path: Path) -> Iterator[OffscreenScene]:
     with OffscreenScene("egl") as made:
         made.open(Source(str(write_scene(tmp_path)), grid=GRID))
         yield made
-
-
-@pytest.mark.parametrize("name", ["a.png", "a.exr"])
-def test_a_full_disk_while_a_picture_is_saved(viewer: OffscreenScene, tmp_path: Path, name: str) -> None:
-    """One line, nothing half-written, what was there stays; with room again the same picture is saved."""
-    path = tmp_path / name
-    path.write_bytes(b"mine")
-    form = PictureFormat()
-    pixels, shot = viewer.picture((96, 64), is_float(path, form)), shot_of(viewer.state, (96, 64), form)
-    others = set(tmp_path.iterdir())
-    with full_disk(900), pytest.raises(InputError, match=f"{name}: cannot be written"):
-        export_picture(path, pixels, shot)
-    assert path.read_bytes() == b"mine"
-    assert set(tmp_path.iterdir()) == others
-    export_picture(path, pixels, shot)
-    assert read_settings(path).size_px == (96, 64)
 
 
 def test_the_photo_may_go_once_it_is_open(viewer: OffscreenScene, tmp_path: Path) -> None:

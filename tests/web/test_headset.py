@@ -74,7 +74,7 @@ class Pose(NamedTuple):
         return EYE_PX / 2 * np.stack([1 - x / z, 1 + y / z], -1)
 
 
-RANDOM = np.random.default_rng(7).uniform(-1, 1, (19, 2, 3)) * ((0.025, 0.015, 0.04), (0.2, 0.3, 0.15))
+RANDOM = np.random.default_rng(7).uniform(-1, 1, (6, 2, 3)) * ((0.025, 0.015, 0.04), (0.2, 0.3, 0.15))
 POSES = [Pose(np.zeros(3), np.zeros(3)), *(Pose(*row) for row in RANDOM)]
 
 
@@ -185,7 +185,7 @@ def red_middle(picture: NDArray[np.uint8]) -> Matrix:
     return np.array([x.mean() + 0.5, y.mean() + 0.5])
 
 
-def test_twenty_poses_show_each_eye_the_desktops_picture_with_true_depth(worn, scene) -> None:
+def test_seven_poses_show_each_eye_the_desktops_picture_with_true_depth(worn, scene) -> None:
     """The red square is where a thing in the room would be: as far before the window as its disparity says."""
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GRID), DEPTH_STRENGTH)

@@ -65,14 +65,6 @@ def test_coverage_agrees_with_a_slow_twin(offset):
     assert has_room.mean() > 0.9
 
 
-def test_a_constant_surface_covers_every_pixel_once():
-    found = find_candidates(ray_set(np.full((8, 9), 0.37), farthest=3.0), ViewOffset(1.1, -2.3), (0, 8))
-    inside = np.s_[2:6, 2:7]
-    assert (found.number[inside] == 1).all()
-    assert found.coverage[0][inside] == pytest.approx(1, abs=1e-5)
-    assert found.disparity[0][inside] == pytest.approx(0.37, abs=1e-6)
-
-
 def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them():
     surfaces = np.tile(np.where(np.arange(12) < 5, 2.0, 1.0), (6, 1))
     closed, opened = (find_candidates(ray_set(surfaces, farthest=3.0), ViewOffset(0, s), (0, 6)) for s in (1.0, 2.0))

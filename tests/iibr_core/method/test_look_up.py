@@ -54,18 +54,6 @@ def test_near_edges_pixels_of_the_own_surface_count_as_a_slow_twin_says(share):
         assert found == pytest.approx(cubic_on_surface_slowly(image, surface, x, y, 1.1, 2.0), abs=1e-4)
 
 
-@pytest.mark.parametrize("offset", [ViewOffset(0.0, 0.4), ViewOffset(-1.3, 2.2)])
-def test_one_surface_is_looked_up_by_keys_cubic(offset):
-    image = np.random.default_rng(5).uniform(0.3, 0.7, (12, 14, 3)).astype(np.float32)
-    rays = ray_set(np.full((12, 14), 0.9), colors=image)
-    candidates = find_candidates(rays, offset, (0, 12))
-    colors, disparity, _ = look_up(rays, candidates, closed_form(candidates)[0])
-    for y, x in ((4, 4), (6, 7), (8, 9)):
-        expected = cubic_slowly(image, x + 0.9 * offset.s, y + 0.9 * offset.t)
-        assert colors[y, x] == pytest.approx(expected, abs=1e-5)
-        assert disparity[y, x] == pytest.approx(0.9)
-
-
 def test_surfaces_that_share_a_pixel_blend_in_linear_light():
     red, blue = np.float32([0.9, 0.1, 0.1]), np.float32([0.1, 0.1, 0.9])
     rays = RaySet(2, ImageSize(3, 3))

@@ -1,6 +1,5 @@
 import csv
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from torch import nn
 
 from iibr_core.formats.weights import read_weights
 from iibr_core.runtime.work import watched
-from iibr_core.training.losses import LossWeights, total_loss
 from iibr_core.training.trainer import Batch, LogRow, TrainConfig, TrainingRun, checkpoint_path, log_path, train
 from iibr_core.types import InputError
 
@@ -77,25 +75,6 @@ def test_weights_checkpoint_and_log_are_written(out):
     assert rates[0] == CONFIG.learning_rate
     assert rates[6] == pytest.approx(CONFIG.learning_rate / 2)
     assert rates == sorted(rates, reverse=True)
-
-
-def test_the_first_step_against_adam_by_hand(out):
-    """Adam's first step is -lr * g / (|g| + eps); the log holds the losses before it."""
-    model, twin = Scorer(), Scorer()
-    config = replace(CONFIG, steps=1, lambdas=LossWeights(3, 5, 7))
-    train(model, batches, config, out)
-    batch = batches(1)
-    weights = twin(batch.features, batch.mask)
-    rendered = torch.einsum("nk,nkc->nc", weights, batch.colors)
-    rendered, truth = (rendered + 1e-4) ** (1 / 2.2), (batch.truth + 1e-4) ** (1 / 2.2)
-    losses = total_loss(rendered, truth, weights, batch.epi_shape, config.lambdas)
-    losses.total.backward()
-    row = log_rows(out)[0]
-    for name, value in losses._asdict().items():
-        assert float(row[name]) == pytest.approx(value.item(), rel=1e-5), name
-    for trained, start in zip(model.parameters(), twin.parameters()):
-        by_hand = start - config.learning_rate * start.grad / (start.grad.abs() + 1e-8)
-        assert torch.allclose(trained, by_hand, rtol=1e-5, atol=1e-7)
 
 
 def test_an_interrupted_training_continues_from_its_checkpoint(tmp_path):

@@ -77,19 +77,6 @@ def test_what_moved_before_it_was_a_drag_and_in_the_frame_of_the_release_counts(
     assert last == step
 
 
-def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
-    seen = []
-
-    def pick(x: float, y: float) -> float:
-        seen.append((x, y))
-        return 0.75
-
-    pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
-    assert actions_from_pointer(pointer, LAYOUT, STATE, pick) == [do(lens.focus_on, pytest.approx((0, 0)), 0.75)]
-    assert seen == [pytest.approx((299.5, 199.5))]
-    assert asked(pointer, picked=None) == [], "nothing is known there"
-
-
 @pytest.mark.parametrize(
     ("pointer", "expected"),
     [
@@ -106,13 +93,6 @@ def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
 )
 def test_what_does_nothing_or_resets(pointer: Pointer, expected: list[object]) -> None:
     assert asked(pointer) == expected
-
-
-def test_the_wheel_moves_the_focus_nearer_and_farther() -> None:
-    (up,), (down,) = (asked(replace(OVER_PICTURE, wheel=wheel)) for wheel in (1.0, -1.0))
-    assert up.verb is lens.set_focus
-    assert down.verb is lens.set_focus
-    assert up.args[0] == -down.args[0] > 0
 
 
 def test_nothing_is_asked_for_without_a_scene_or_room() -> None:
@@ -183,14 +163,6 @@ def test_picture_corners_are_half_a_pixel_outside_the_first_and_last_pixel() -> 
 ZOOMED = layout_of((1280, 800), (600, 400), zoom=Zoom(4.0), own_width=600)
 
 
-def test_ctrl_and_the_wheel_zoom_over_the_picture() -> None:
-    (action,) = asked(replace(OVER_PICTURE, wheel=1.0, holds_ctrl=True))
-    assert action.verb is viewpoint.set_zoom
-    assert action.args[0] is not None
-    assert action.args[0].scale > LAYOUT.fit
-    assert asked(replace(OVER_PICTURE, x=1, y=1, wheel=1.0, holds_ctrl=True)) == []
-
-
 def test_a_press_on_the_small_picture_moves_the_large_one_and_points_at_nothing() -> None:
     at = ZOOMED.minimap
     assert at is not None
@@ -202,11 +174,3 @@ def test_a_press_on_the_small_picture_moves_the_large_one_and_points_at_nothing(
         assert action.args[0] is not None
         assert action.args[0].centre == pytest.approx((0.8, 0.3))
     assert actions_from_hover(pointer, ZOOMED, STATE, lambda x, y: 1.5) == []
-
-
-def test_pulling_moves_the_zoomed_picture_and_nothing_else() -> None:
-    pulling = replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=5.0, pulls=True)
-    (action,) = asked(pulling, layout=ZOOMED)
-    assert action.verb is viewpoint.set_zoom
-    assert asked(pulling) == []  # all of it is seen
-    assert asked(replace(pulling, is_down=False, is_released=True, step_x=0.0, drag_distance=0.0), layout=ZOOMED) == []

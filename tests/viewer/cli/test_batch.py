@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ import psutil
 import pytest
 from PIL import Image
 
+from iibr_core.exports import batch
 from tests.viewer.cli.conftest import Iibr
 from viewer.cli.messages import BETTER_DEPTH
 
@@ -35,13 +37,9 @@ def archive(tmp_path: Path) -> Path:
     return folder
 
 
-def command(archive: Path, *words: object, to: str = "hci") -> list[str]:
-    options = ("--to", to, "--grid", "3", "-o", archive.with_name("out"))
+def command(archive: Path, *words: object) -> list[str]:
+    options = ("--to", "hci", "--grid", "3", "-o", archive.with_name("out"))
     return [sys.executable, "-P", "-m", "viewer", "batch", str(archive), *map(str, (*options, *words))]
-
-
-def run_batch(archive: Path, *words: object, to: str = "hci") -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(archive, *words, to=to), capture_output=True, text=True, timeout=300)
 
 
 def start_batch(archive: Path, *words: object) -> subprocess.Popen[str]:
@@ -65,12 +63,17 @@ def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
     return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
 
 
-def test_an_archive_is_exported_once(archive: Path) -> None:
+def test_an_archive_is_exported_once(iibr: Iibr, archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In threads: those below run in processes."""
+    monkeypatch.setattr(batch, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
+    for variable in ("IIBR_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONWARNINGS", "PYTHONSAFEPATH"):
+        monkeypatch.setenv(variable, os.environ.get(variable, ""))
     out = archive.with_name("out")
+    words = "batch", archive, "--to", "depth", "--grid", 3, "-o", out
     for path in sorted(archive.iterdir())[3:]:
         path.unlink()
     (archive / "torn.png").write_bytes((archive / "00.png").read_bytes()[:200])
-    done = run_batch(archive, "--workers", 2, to="depth")
+    done = iibr(*words)
     guesses = f"3 of 3 written have guessed depth. {BETTER_DEPTH}"
     assert done.stdout.splitlines() == [f"{out}: 3 written, 0 there before, 1 failed", guesses]
     assert done.returncode == 2
@@ -79,7 +82,7 @@ def test_an_archive_is_exported_once(archive: Path) -> None:
     (failure,) = csv.DictReader((out / "failures.csv").read_text().splitlines())
     assert failure["photo"] == str(archive / "torn.png")
     (archive / "torn.png").unlink()
-    again = run_batch(archive, to="depth")
+    again = iibr(*words)
     assert (again.returncode, again.stdout, again.stderr) == (0, f"{out}: 0 written, 3 there before, 0 failed\n", "")
 
 

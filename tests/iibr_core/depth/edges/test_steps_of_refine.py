@@ -1,32 +1,12 @@
 import numpy as np
 import pytest
-from scipy.ndimage import map_coordinates
 
-from iibr_core.depth.edges.blur import extent, measure_edge_blur
-from iibr_core.depth.edges.fit import _find_missing, fit_to_blur
-from iibr_core.depth.edges.line import gradient, height_at
+from iibr_core.depth.edges.blur import measure_edge_blur
+from iibr_core.depth.edges.fit import fit_to_blur
 from iibr_core.depth.edges.lone import _find_lone, fill_lone
 from iibr_core.training.degradation import blur
 from tests.iibr_core.depth.edges.test_refine import disc_before_slope
 from tests.iibr_core.scenes import smooth_texture
-
-
-def test_heights_are_bilinear_and_the_border_goes_on():
-    values = np.random.default_rng(0).normal(0, 1, (5, 7)).astype(np.float32)
-    places = np.random.default_rng(1).uniform(-2, 9, (60, 2))
-    found = [height_at(values, x, y) for y, x in places]
-    expected = map_coordinates(values.astype(float), places.T, order=1, mode="nearest")
-    np.testing.assert_allclose(found, expected, atol=1e-6)
-    assert height_at(values, 6.0, 4.0) == values[4, 6]
-
-
-def test_gradients_of_planes_are_exact():
-    y, x = np.mgrid[:9, :11].astype(np.float32)
-    np.testing.assert_allclose(gradient(0.5 * x - 0.25 * y, 5, 4), (0.5, -0.25), atol=1e-6)
-    # Rows and columns are alike.
-    bumpy = np.random.default_rng(2).normal(0, 1, (9, 9)).astype(np.float32)
-    assert gradient(bumpy, 3, 6) == pytest.approx(gradient(bumpy.T.copy(), 6, 3)[::-1], abs=1e-6)
-
 
 RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
 NEAR, FAR, EDGE = 9.0, 2.0, 0.3
@@ -83,17 +63,6 @@ def test_ragged_outlines_become_whole() -> None:
     assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
 
 
-def test_the_missing_part_is_the_map_minus_the_blurred_one() -> None:
-    _, _, exact = scene()
-    taps = np.exp(-0.5 * (np.arange(-6, 7) / SIGMA) ** 2)
-    taps = (taps / taps.sum()).astype(np.float32)
-    missing = np.empty_like(exact)
-    _find_missing(np.zeros_like(exact), exact, taps, 0, 120, missing)
-    padded = np.pad(exact, 6, mode="edge")
-    for y, x in ((0, 0), (50, 36), (119, 119)):
-        assert -missing[y, x] == pytest.approx(taps @ padded[y : y + 13, x : x + 13] @ taps, abs=1e-5)
-
-
 @pytest.mark.parametrize(
     ("sigma", "size", "measured"), [(1.0, 160, 1.0), (4.0, 160, 4.0), (8.0, 180, 8.0), (8.0, 140, 0), (0.0, 160, 0)]
 )
@@ -122,10 +91,3 @@ def test_an_edge_that_the_photo_does_not_share_proves_nothing() -> None:
     assert measure_edge_blur(photo, soft) > 0
     for other in (np.full_like(photo, 0.5), smooth_texture(160, 160)):
         assert measure_edge_blur(other, soft) == 0
-
-
-def test_the_range_leaves_out_a_few_at_both_ends() -> None:
-    values = np.linspace(-2, 3, 10_000, dtype=np.float32).reshape(100, 100)
-    values[0, :5], values[1, :5] = 1e6, -1e6
-    assert extent(values) == pytest.approx(0.96 * 5, rel=0.01)
-    assert extent(np.zeros((0, 4), np.float32)) == 0
