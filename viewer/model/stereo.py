@@ -26,6 +26,7 @@ MAX_MARGIN = 0.3
 """Largest share of the width that the shear may crop at each side."""
 BESIDE: tuple[StereoMode, ...] = ("sbs", "half-sbs", "cross-eyed")
 """Modes with the eyes' pictures side by side."""
+HOW_TO_LEAVE = "Stereo picture: Esc or 3 closes it, Tab shows the panel."
 
 # Verbs
 
@@ -35,7 +36,10 @@ def show(state: AppState, is_shown: bool) -> AppState:
     wanted = monitor_of(state)
     monitor = None if wanted in state.monitors[:1] else wanted
     shown = replace(state, stereo=replace(state.stereo, is_shown=is_shown, monitor=monitor))
-    return replace(shown, hides_panel=None) if shown.stereo.fills_window else shown
+    if not shown.stereo.fills_window:
+        return shown
+    shown = replace(shown, hides_panel=None)
+    return shown if state.stereo.is_shown else notify(shown, Notice(HOW_TO_LEAVE, is_result=True))
 
 
 def monitor_of(state: AppState) -> Monitor | None:

@@ -10,12 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.beyond.optics import APERTURE_KINDS, EXPOSURE_LIMIT_STOPS, ApertureShape, Optics
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.lens_limits import STEEPEST_TILT, aperture_limit, focus_limits, focus_span, is_finite
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
-from viewer.model import gesture, history, lens, opening
+from viewer.model import depth, gesture, history, lens, look, opening
 from viewer.model.action import Action, do
 from viewer.model.carried_optics import carry_optics
 from viewer.model.focal_plane import sharp_disparity
@@ -264,3 +266,22 @@ def test_depth_strength_makes_the_field_again_and_ends_with_the_photo() -> None:
     assert opened.depth_strength == lens.requested_strength(opened) == 1.0
     first = replace(AppState(source=Source("first.png")), depth_strength=3.0)
     assert lens.requested_strength(first) == 3.0, "as the command line asks"
+
+
+def test_a_look_is_given_to_another_photo_with_its_own_focus_and_strokes() -> None:
+    first = scene_of(plan=plan_of(GridShape(9, 9)))
+    state = reduce(state_with(first), do(lens.set_aperture, 4.5))
+    state = reduce(state, do(lens.set_exposure, 1.0))
+    state = reduce(state, do(depth.set_tone, DepthEdits(gamma=1.5), is_finished=True))
+    state = reduce(reduce(state, do(look.copy_look)), do(opening.open_source, Source("b.png")))
+    other = scene_of(GridShape(5, 5), Source("b.png"), plan=plan_of(GridShape(5, 5)))
+    other = replace(other, source=state.source)
+    state = reduce(state, do(opening.show_scene, state.generation, other))
+    state = reduce(state, do(lens.set_focus, 1.0))
+    before = state
+    state = reduce(state, do(look.paste_look))
+    assert state.optics.aperture_diameter == pytest.approx(2.5), "half open, too"
+    assert (state.optics.exposure_stops, state.optics.focus_disparity) == (1.0, before.optics.focus_disparity)
+    assert state.depth.edits.gamma == 1.5
+    assert state.generation == before.generation + 1
+    assert reduce(state, do(history.undo)).optics == before.optics

@@ -18,6 +18,7 @@ from viewer.model.state.depth_models import DepthModels
 from viewer.model.state.folder import PhotoFacts, PhotoFolder
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.lens import GlossBrush, TiltHandles
+from viewer.model.state.look import Look
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import ExportPrompt, FinishedFile, JobProgress, Prompt
@@ -137,6 +138,7 @@ class AppState:
     tracking: Tracking | None = None
     stereo: Stereo = field(default_factory=Stereo)
     monitors: tuple[Monitor, ...] = ()
+    look: Look | None = None
 
     @property
     def at_rest(self) -> AppState:

@@ -6,7 +6,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from iibr_core.scenes.rect import Rect
-from viewer.model import depth_models, viewpoint, window
+from viewer.model import depth_models, tracking, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
@@ -16,6 +16,7 @@ from viewer.ui.widgets import scale, tooltip
 
 CHIP, BADGE, DRAFT = "free camera", "Depth guessed", "Draft"
 FULL, SHORT = "Free camera: the photo does not show all of this. C returns", "Free camera. C returns"
+FOLLOWING = "Follows the head. H stops it"
 AT_END = "The photo shows nothing beyond this. C returns"
 GUESS_TIP = "Depth is guessed, so near and far may be wrong. Press to get better depth."
 GAP = 8.0
@@ -35,6 +36,9 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
         draw_words(DRAFT, frame.x + (frame.width - gap if is_right else gap), frame.y + gap, scale(), float(is_right))
     if has_guess_badge(state, layout):
         return [do(depth_models.show_offer, True)] if _chip(BADGE, BADGE, frame, GUESS_TIP) else []
+    if camera is None and state.tracking is not None:
+        words = f"{icons.ICON_FA_VIDEO}  {FOLLOWING}###leave"
+        return [do(tracking.switch, None)] if _chip(CHIP, words, frame, is_right=True) else []
     if camera is None:
         return []
     words = AT_END if camera.is_at_end else FULL

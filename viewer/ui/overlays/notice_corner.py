@@ -112,7 +112,7 @@ def _offer(model: ModelOffer, smallest: ModelOffer | None) -> list[Action]:
     quiet(words)
     offers = [] if model.lacks else [(verb, do(depth_models.get_depth))]
     if smallest is not None and not model.is_here and smallest.megabytes < model.megabytes:
-        offers.append((f"Smaller ({smallest.megabytes} MB)", do(depth_models.use_model, smallest.name)))
+        offers.append((f"or {smallest.megabytes} MB", do(depth_models.use_model, smallest.name)))
     actions += button_rows([*offers, ("Don't offer again", do(depth_models.offer_no_more))])
     imgui.end_group()
     return actions

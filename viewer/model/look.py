@@ -1,0 +1,49 @@
+"""The look of a picture, to be copied to other photos: aperture, light, tone of the depth, and depth strength."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
+from viewer.model.history import undoable
+from viewer.model.messages import notify
+from viewer.model.state.app_state import AppState
+from viewer.model.state.look import Look
+from viewer.model.state.notices import Notice
+
+COPIED = "Copied the look. Ctrl+Shift+V gives it to another photo."
+NO_LOOK = "There is no look to paste. Copy one first (Ctrl+Shift+C)."
+
+
+def copy_look(state: AppState) -> AppState:
+    """Remember the look of the open picture."""
+    scene, optics = state.scene, state.optics
+    if scene is None:
+        return state
+    widest, span = aperture_limit(scene) or 1.0, focus_span(scene) or 1.0
+    tone = replace(state.depth.edits, strokes=())
+    look = Look(optics, optics.aperture_diameter / widest, optics.focus_range / span, tone, state.depth_strength)
+    return notify(replace(state, look=look), Notice(COPIED, is_result=True))
+
+
+@undoable
+def paste_look(state: AppState) -> AppState:
+    """Give the open picture the look that was copied; viewpoint, focus, gloss and strokes stay its own."""
+    scene, look = state.scene, state.look
+    if scene is None:
+        return state
+    if look is None:
+        return notify(state, Notice(NO_LOOK))
+    optics = replace(
+        state.optics,
+        aperture_diameter=look.aperture_share * aperture_limit(scene),
+        focus_range=look.range_share * focus_span(scene),
+        aperture_shape=look.optics.aperture_shape,
+        highlight_recovery=look.optics.highlight_recovery,
+        exposure_stops=look.optics.exposure_stops,
+    )
+    state = replace(state, optics=clamp_optics(optics, scene), has_chosen_aperture=True, shows_before=False)
+    depth = replace(state.depth, edits=replace(look.tone, strokes=state.depth.edits.strokes))
+    if scene.plan is None or (depth, look.depth_strength) == (state.depth, state.depth_strength):
+        return state
+    return replace(state, depth=depth, depth_strength=look.depth_strength, generation=state.generation + 1)
