@@ -1,6 +1,7 @@
 """Two files that are a stereo pair: left and right, NAME_L and NAME_R, and the like; or a folder of two pictures."""
 
 import re
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import PictureSource, small_decoded_picture
 from iibr_core.formats.light_fields.grids import MAP_WORDS
 from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, pictures_in
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, InputError, ViewOffset
 
 TWO_FILES = "stereo, two files"
 """Layout of such a pair, for people."""
@@ -34,8 +35,10 @@ def pair_of(path: Path) -> tuple[Path, Path] | None:
 
 
 def is_pair(first: Path, second: Path) -> bool:
-    """Return whether two files show one scene at one size, as a pair does."""
-    return _is_pair(first, second, stamp_of(first), stamp_of(second))
+    """Return whether two files show one scene at one size, as a pair does; False if one of them cannot be read."""
+    with suppress(InputError):
+        return _is_pair(first, second, stamp_of(first), stamp_of(second))
+    return False
 
 
 @lru_cache(maxsize=8)

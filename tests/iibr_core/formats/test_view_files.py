@@ -317,6 +317,8 @@ def test_two_files_are_a_pair_where_names_and_pictures_agree(tmp_path, left, rig
         assert scene.layout == "stereo, two files"
     Image.fromarray(pictures(1, 40, 48)[0]).save(tmp_path / right)
     assert find_light_field(tmp_path / left) is None
+    (tmp_path / right).write_bytes(b"no picture")
+    assert find_light_field(tmp_path / left) is None
 
 
 def test_two_pictures_of_one_scene_are_a_pair_under_any_names(tmp_path) -> None:
