@@ -31,7 +31,7 @@ FILE_READERS = ("view_files:read_quilt", "view_files:read_lenslet_image", "view_
 
 LAYOUTS = (
     "HCI, Stanford archive, JPEG Pleno, LLFF, nerfstudio, COLMAP, Middlebury, views/v00_u00.png ..., left.jpg and"
-    " right.jpg; or give --grid ROWSxCOLUMNS for views under other names"
+    " right.jpg; or state the grid of views under other names"
 )
 """Layouts of folders, for people."""
 FILES = "give a quilt (..._qs8x6a0.75.png), a lenslet image (..._eslf.png), a stereo photo, or a folder of views"
