@@ -1,4 +1,4 @@
-"""What lies behind the photo's surfaces, as an open lens sees it past their edges.
+"""The surfaces behind the photo's, which an open lens sees past their edges.
 
 The farthest views of a light field have inpainted some of it, and a wide lens sees more. Their content comes first, so
 that a picture through the lens agrees with all views; the rest is inpainted in the same way.

@@ -1,7 +1,7 @@
 """Slices of defocus, and the disc of each: a picture through a lens is made of slices that are blurred one by one.
 
-A slice holds what is out of focus by about the same: its disc has one diameter, in pixels of the picture, positive for
-what is nearer than the focus. Wide discs are drawn at a reduced size, so all discs cost about the same.
+A slice holds the pixels with about the same defocus: its disc has one diameter, in pixels of the picture, positive for
+surfaces nearer than the focus. Wide discs are drawn at a reduced size, so all discs cost about the same.
 Plain arrays, no GL; web/renderer.js has the same.
 """
 
@@ -33,7 +33,7 @@ MAX_TAPS = 320
 SUBSAMPLES = 4
 """Samples of the aperture across a pixel."""
 STEPS_A_TEXEL = 16
-"""Steps of a disc's diameter that are told apart, for each pixel of the size at which it is drawn."""
+"""Number of different diameters of a disc for each pixel of the size at which it is drawn."""
 REDUCTION_BLUR = 16 / 6
 """Square of the diameter of the disc, in reduced pixels, that blurs as much as reduction and enlargement."""
 

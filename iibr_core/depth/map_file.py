@@ -70,7 +70,7 @@ def orient_map(
     """Return the depth of a map of unknown scale: the photo decides which end is near, then the numbers of the map.
 
     name: of the map, in notes. is_distance: whether the values are likely distances. is_stated: whether files beside
-    the map state that; the photo must then show the contrary clearly. is_disparity: whether its name says disparity.
+    the map state that; the photo must then show the contrary clearly. is_disparity: whether it is named disparity.
     """
     evidence, is_measured = near_evidence(photo.pixels, numbers.values), numbers.is_measured and not is_disparity
     is_large_near, reason = not is_distance, "as its files state" if is_stated else AS_USUAL

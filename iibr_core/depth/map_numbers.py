@@ -34,7 +34,7 @@ a wider one in 8 bits.
 MIN_GAP_LEVELS = 4
 """Smallest ratio of such a gap to the usual one between two values."""
 MIN_MARKED_SHARE = 0.001
-"""Smallest share of the map that marks cover which say how the map was made."""
+"""Smallest share of the map that marks of a depth camera or a program cover."""
 MIN_MEASURED_LEVELS = 64
 """Smallest number of different values of a depth camera's map; drawn layers have fewer."""
 AREA_SHARE = 0.03

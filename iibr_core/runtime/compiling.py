@@ -1,4 +1,4 @@
-"""What is said and counted while kernels are compiled. Light: commands import it from the start, Numba comes later."""
+"""Messages and counts while kernels are compiled. Light: commands import it from the start, Numba comes later."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class PictureTargets:
 
 
 class PinholeTargets:
-    """What an open lens blurs. light: sum of light, weighted by alpha. seen: disparity."""
+    """The picture of a pinhole, which an open lens blurs. light: sum of light, weighted by alpha. seen: disparity."""
 
     def __init__(self, ctx: moderngl.Context, size_px: ScreenSize) -> None:
         self.size_px = ScreenSize(*size_px)

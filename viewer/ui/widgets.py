@@ -184,7 +184,7 @@ def colored(text: str, color: imgui.ImVec4) -> None:
 
 
 def lines(text: str, count: int, width: float) -> None:
-    """Build quiet words on exactly that many lines, so that nothing below moves; what is left out is in a tooltip."""
+    """Build quiet words on exactly that many lines, so that nothing below moves; a tooltip shows what does not fit."""
     room, start = count * imgui.get_text_line_height(), imgui.get_cursor_pos_y()
     shown = text
     while shown and imgui.calc_text_size(shown, False, width).y > room:

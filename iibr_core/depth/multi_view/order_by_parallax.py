@@ -49,7 +49,7 @@ EQUAL_STEPS, EQUAL_STATED_STEPS = 0.06, 0.25
 and of a layout whose rows usually stand as far apart as columns.
 """
 Verdict = Literal["clear", "silent", "contrary"]
-"""What parallax says about the order of views: one, nothing, or that none fits."""
+"""Result of the test of the order of views by parallax: one order fits, nothing is known, or none fits."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Fit:
 def find_order(
     scene: MultiView, views: Sequence[StoredColors], given: Arrangement = UNKNOWN
 ) -> tuple[Fit | None, Verdict]:
-    """Return the arrangement that the parallax of the views shows, None if it shows none, and what it says.
+    """Return the arrangement that the parallax of the views shows, None if it shows none, and the verdict.
 
     views: colours (H, W, 3) of each view of the scene. given: what the user has decided. Its flip is a first guess: the
     names' own, or rows from bottom to top. Raises InputError if the views contradict every order, and neither the user

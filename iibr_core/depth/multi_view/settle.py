@@ -55,7 +55,7 @@ class Settled:
 
     views: all views, the centre and those near it first. offsets: their viewpoints from it. coarse: its disparity.
     arrangement: the order, UNKNOWN where the layout is sure of it. measured: number of views that show the order, 0 if
-    they do not. verdict: what parallax says of it. is_sure: whether near and far cannot be exchanged. named: the field
+    they do not. verdict: of its test by parallax. is_sure: whether near and far cannot be exchanged. named: the field
     in the order of its names.
     """
 

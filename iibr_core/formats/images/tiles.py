@@ -1,4 +1,4 @@
-"""Photos that look like tiles of one scene: quilts and mosaics of views whose names do not say so."""
+"""Photos that look like tiles of one scene: quilts and mosaics of views without a tag in their names."""
 
 import numpy as np
 

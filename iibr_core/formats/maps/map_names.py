@@ -22,12 +22,12 @@ MAP_BEFORE = re.compile(rf"{KIND}{SEPARATOR}(?P<photo>.+?){COPY}", re.IGNORECASE
 PAIRED = re.compile(
     rf"(?P<behind>.+?){SEPARATOR}{PICTURE}|{PICTURE}(?:{SEPARATOR}|(?=\d))(?P<before>.+)|{PICTURE}", re.IGNORECASE
 )
-"""Names of photos that say that a map comes with them."""
+"""Names of photos that come with a map."""
 COPIED = re.compile(rf"(.+?){COPY}", re.IGNORECASE)
 FOLDER_OF_MAPS = re.compile(KIND, re.IGNORECASE)
 FOLDER_OF_PHOTOS = re.compile(PICTURE, re.IGNORECASE)
 OF_COLMAP = (".geometric", ".photometric")
-"""What COLMAP puts behind the whole name of the photo."""
+"""Endings that COLMAP adds to the whole name of the photo."""
 MAP_ENDINGS = (
     ".pfm", ".exr", ".npy", ".npz", ".tif", ".tiff", ".png", ".webp", ".jpg", ".jpeg", ".dpt", ".depth", ".bin", ".dmb",
     ".flo", ".bmp", ".jxl", ".jp2", ".avif", ".heic", ".tga", ".gif", ".psd", ".pgm", ".ppm", ".hdr",
@@ -42,14 +42,14 @@ LIKELY_ENDINGS = (*MAP_ENDINGS, ".mat", ".h5", ".hdf5", ".raw", ".csv", ".txt")
 
 
 class MapName(NamedTuple):
-    """What the name of a map says. key: of its photo, see `photo_keys`. is_depth: whether it says depth."""
+    """Meaning of a map's name. key: of its photo, see `photo_keys`. is_depth: whether it names depth, not disparity."""
 
     key: str
     is_depth: bool
 
 
 def map_name(stem: str) -> MapName | None:
-    """Return what the stem of a map's name says; None where it names no map."""
+    """Return the meaning of the stem of a map's name; None where it names no map."""
     folded = fold(stem)
     for pattern in (MAP_BEFORE_NUMBER, MAP_BEHIND, MAP_BEFORE):
         if (found := pattern.fullmatch(folded)) is not None:
@@ -65,7 +65,7 @@ def photo_keys(stem: str) -> tuple[str, ...]:
 
 
 def says_depth(name: str) -> bool:
-    """Return whether the name of a map or of a folder of maps, without ending, says depth and not disparity."""
+    """Return whether the name of a map or of a folder of maps, without ending, names depth and not disparity."""
     said = map_name(name)
     return said is not None and said.is_depth
 

@@ -39,7 +39,7 @@ FOREIGN = (
 
 
 class OtherMap(NamedTuple):
-    """A map of another program. name: what it holds, as names of arrays say it."""
+    """A map of another program. name: its content, as arrays are named."""
 
     values: FloatImage
     name: str

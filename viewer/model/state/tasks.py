@@ -81,7 +81,7 @@ class ShowFileTask:
 
 @dataclass(frozen=True)
 class FocusTask:
-    """Focus on what is seen now at a place, (x, y) from -1 to 1 across the picture, y down."""
+    """Focus on the surface that is seen now at a place, (x, y) from -1 to 1 across the picture, y down."""
 
     place: tuple[float, float]
 
