@@ -23,6 +23,8 @@ SMALL_SIDE_PX = 160
 """Longer side of the small copy."""
 MAX_STEPS = 512
 """Largest number of disparities of a sweep; a wider range is swept more coarsely."""
+MIN_STRIPED = 0.002
+"""Smallest share of stripes for which surfaces are found twice."""
 FEW_VIEWS_STEP = 2 / 3
 """Share of the usual number of disparities that few views are matched at."""
 MIN_SURENESS = 0.4
@@ -81,13 +83,25 @@ def estimate_disparity(
 
     Arguments and errors are those of `estimate_coarse`, which finds the range.
     """
-    return estimate_with_doubt(views, offsets, reference, range_px)[0]
+    return _estimate(views, offsets, reference, range_px)[0]
 
 
 def estimate_with_doubt(
     views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int, range_px: tuple[float, float]
 ) -> tuple[FloatImage, NDArray[np.bool_]]:
     """Return the same, and where it is in doubt (H, W): in plain and in striped areas, which match anywhere."""
+    values, is_doubtful = _estimate(views, offsets, reference, range_px)
+    # What repeats itself may do so outside of the range.
+    small, _, disparities = _small_copy(views, offsets, reference)
+    with watched(ignore_progress):
+        repeats = find_stripes(sweep(small, disparities))[0].astype(np.float32)
+    return values, is_doubtful | (resample_surfaces(repeats, image_size(values)) > 0.5)
+
+
+def _estimate(
+    views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int, range_px: tuple[float, float]
+) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """Return the disparity (H, W), and where it is in doubt by the range alone."""
     matched = matching_views(views, offsets, reference)
     is_checked = len(views) <= FEW_VIEWS
     steps = _steps(range_px, matched.reach * (FEW_VIEWS_STEP if is_checked else 1))
@@ -104,11 +118,7 @@ def estimate_with_doubt(
             values = fill_disparity_by_color(matched.colors, np.where(is_seen, values, np.float32(np.nan)))
     refined = np.clip(refine_by_gradients(matched, values), *range_px)
     report_progress(parts, parts, FINDING)
-    # What repeats itself may do so outside of the range.
-    small, _, every = _small_copy(views, offsets, reference)
-    with watched(ignore_progress):
-        repeats = find_stripes(sweep(small, every))[0].astype(np.float32)
-    return refined, found.is_plain | found.is_striped | (resample_surfaces(repeats, image_size(refined)) > 0.5)
+    return refined, found.is_plain | found.is_striped
 
 
 def left_right_check(
@@ -150,7 +160,7 @@ def find_confirmed(maps: Sequence[FloatImage], offsets: Sequence[ViewOffset], in
 
 def sweep_bytes(size: ImageSize, range_px: tuple[float, float], reach: float) -> int:
     """Return the memory that `estimate_disparity` takes beside the views. reach: view steps to the farthest view."""
-    costs_and_sums, textures_and_spare = 5 * (_steps(range_px, reach) + 1), 4 * (33 + 24)
+    costs_and_sums, textures_and_spare = 6 * (_steps(range_px, reach) + 1), 4 * (33 + 32)
     return size.height * size.width * (costs_and_sums + textures_and_spare)
 
 
@@ -172,7 +182,7 @@ def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> _Match:
     """Match every pixel; a median smooths single pixels away."""
     costs = sweep(views, disparities)
     is_striped, limits = find_stripes(costs)
-    if is_striped.any():
+    if is_striped.mean() > MIN_STRIPED:
         # First without the costs of stripes: the surfaces around them reach across. 0 decides at equal distance.
         blank = np.where(is_striped[..., None], np.uint8(0), costs)
         near = choose_disparity(blank, views.colors, disparities, is_striped)[0] * (not is_striped.all())
