@@ -323,7 +323,7 @@ export class Renderer {
         });
         this.setSamples(samples);
         gl.enable(gl.BLEND);
-        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR", ...switches], this.target, {
+        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR", lens.diameter > 0 && "SUMMED", ...switches], this.target, {
             sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
             part: [part.x, part.y, part.width, part.height], field_part: [0, 0, 1, 1], view_step: [1, field.rowStep],

@@ -90,3 +90,7 @@ class Optics:
     def highlight_gain(self, diameter: float, is_hdr: bool) -> float:
         """Return the light added to clipped pixels, where white is 1. diameter: the aperture's, in view steps."""
         return 0.0 if is_hdr else HIGHLIGHT_GAIN * self.highlight_recovery * min(diameter, 1.0)
+
+
+PINHOLE = Optics()
+"""The photo as it was taken."""

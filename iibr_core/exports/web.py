@@ -20,7 +20,8 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.extras import how_to_install
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
-from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits
+from iibr_core.scenes.lens_limits import eye_limits, first_aperture, focus_limits
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import SRGB, ImageSize
 
 AVIF = "image/avif"
@@ -115,10 +116,15 @@ def _shaders(folder: Path) -> dict[str, str]:
     return {PREAMBLE: (folder / PREAMBLE).read_text("utf-8"), **without}
 
 
+def page_aperture_limit(scene: Scene) -> float:
+    """Return the widest aperture of a page in view steps: the grid, because its views are added up."""
+    return float(max(scene.grid) if max(scene.grid) > 1 else 0)
+
+
 def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
     """Return the script's data about the field; lengths are in pixels of the page's views."""
     scene = source.scene
-    scale = views.size.width / scene.width
+    scale, widest = views.size.width / scene.width, page_aperture_limit(scene)
     return {
         "rows": scene.grid.rows,
         "columns": scene.grid.columns,
@@ -133,10 +139,10 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "colorSpace": "srgb" if scene.color_space == SRGB else "display-p3",
         "eyeLimits": {"t": eye_limits(scene.grid.rows), "s": eye_limits(scene.grid.columns)},
         "focusLimits": [scale * limit for limit in focus_limits(scene)],
-        "apertureLimits": [0.0, aperture_limit(scene)],
-        "firstAperture": first_aperture(scene),
+        "apertureLimits": [0.0, widest],
+        "firstAperture": min(first_aperture(scene), widest),
         "focus": scale * source.optics.focus_disparity,
-        "aperture": source.optics.aperture_diameter,
+        "aperture": min(source.optics.aperture_diameter, widest),
         "numbers": page_numbers(),
     }
 

@@ -79,4 +79,6 @@ def export(
         with show_progress("exporting"):
             message = write_export(kind, target, opened, options)
     print(target)
-    print_notes(*opened.scene.notes, *lens.notes(opened.optics), message, origin=opened.scene.depth_origin)
+    print_notes(
+        *opened.scene.notes, *lens.notes(opened.optics, opened.scene), message, origin=opened.scene.depth_origin
+    )

@@ -7,16 +7,17 @@ import re
 from collections.abc import Callable, Collection, Set
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from iibr_core.beyond.optics import Optics
+from iibr_core.beyond.optics import RING_INNER_LIMIT, ApertureKind, ApertureShape, Optics
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.order import Arrangement, Flip, Order
 from iibr_core.gloss.settings import Gloss
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, require_inpainter
+from iibr_core.scenes.f_numbers import aperture_of
 from iibr_core.scenes.inputs import inputs_of
 from iibr_core.scenes.lens_limits import LensChoice, eye_limits
 from iibr_core.scenes.scene import Scene, Source
@@ -54,6 +55,22 @@ def view_from_text(text: str) -> ViewOffset:
     except (ValueError, typer.BadParameter):
         raise typer.BadParameter(f"{text!r} is not a viewpoint: give S,T in view steps, such as 2,-1.5") from None
     return ViewOffset(t, s)
+
+
+class Pair(NamedTuple):
+    """Two numbers: to the right, and down."""
+
+    x: float
+    y: float
+
+
+def pair_from_text(text: str) -> Pair:
+    """Return two numbers from "X,Y". Raises BadParameter."""
+    try:
+        x, y = map(number_from_text, text.split(","))
+    except (ValueError, typer.BadParameter):
+        raise typer.BadParameter(f"{text!r} are not two numbers: give X,Y, such as 480,620") from None
+    return Pair(x, y)
 
 
 def number_from_text(text: str) -> float:
@@ -263,12 +280,77 @@ class LensOptions:
             parser=number_from_text,
         ),
     ] = None
+    focus_at: Annotated[
+        Pair | None,
+        option("Place of the photo in focus: pixels from the left and the top.", "X,Y", parser=pair_from_text),
+    ] = None
+    focus_range: Annotated[
+        float | None, option("Disparity before and behind the focus that is sharp, too.", "X", min=0)
+    ] = None
+    tilt: Annotated[
+        Pair | None,
+        option("Change of the focus to the right and to the lower border, in disparity.", "X,Y", parser=pair_from_text),
+    ] = None
     aperture: Annotated[float | None, option("Aperture diameter in view steps.", "X", min=0)] = None
+    f_number: Annotated[
+        float | None, option("Aperture as f-number of a full-frame lens, as the window shows it.", "N", min=0.1)
+    ] = None
+    blades: Annotated[int | None, option("Polygon with so many corners as aperture.", "N", min=3, max=11)] = None
+    ring: Annotated[
+        float | None, option("Ring as aperture; blocked share of its radius.", "X", min=0, max=RING_INNER_LIMIT)
+    ] = None
+    cat_eye: Annotated[
+        float | None, option("Round aperture that the barrel cuts off in the corners.", "X", min=0, max=1)
+    ] = None
+    mask: Annotated[Path | None, option("Grey picture as aperture, white is open.", "FILE")] = None
+    rotation: Annotated[float | None, option("Turn of a polygon or mask, clockwise.", "DEG")] = None
+    highlights: Annotated[
+        float | None, option("Stops by which clipped light counts for more than white.", "X", min=0, max=4)
+    ] = None
     gloss: GlossFile = None
 
     def choice(self) -> LensChoice:
-        """Return the same for the core. Raises InputError if the gloss cannot be read."""
-        return LensChoice(self.view, self.focus, self.aperture, gloss_of(self.gloss))
+        """Return the same for the core. Raises InputError if a file cannot be read, and for options at odds."""
+        if self.focus is not None and self.focus_at is not None:
+            raise InputError("--focus and --focus-at: give one of both")
+        if self.aperture is not None and self.f_number is not None:
+            raise InputError("--aperture and --f-number: give one of both")
+        return LensChoice(
+            self.view,
+            self.focus,
+            self.aperture,
+            gloss_of(self.gloss),
+            self.focus_at,
+            self.f_number,
+            self.focus_range,
+            self.tilt,
+            self._shape(),
+            self.highlights,
+        )
+
+    def _shape(self) -> ApertureShape | None:
+        shapes: dict[ApertureKind, float | Path | None] = {
+            "polygon": self.blades,
+            "ring": self.ring,
+            "cat_eye": self.cat_eye,
+            "mask": self.mask,
+        }
+        given = [kind for kind, value in shapes.items() if value is not None]
+        if len(given) > 1:
+            raise InputError("--blades, --ring, --cat-eye and --mask: give one of them")
+        if not given:
+            return None
+        from viewer.model.aperture_mask import read_mask  # imports numpy
+
+        usual = ApertureShape()
+        return ApertureShape(
+            given[0],
+            self.blades or usual.blades,
+            self.rotation or 0.0,
+            usual.ring_inner if self.ring is None else self.ring,
+            usual.cat_eye if self.cat_eye is None else self.cat_eye,
+            None if self.mask is None else read_mask(self.mask),
+        )
 
     def require_within(self, scene: Scene) -> None:
         """Raise InputError for a viewpoint outside the scene's views; a single view shows every viewpoint."""
@@ -279,17 +361,25 @@ class LensOptions:
             if not low <= value <= high:
                 raise InputError(f"--view: {axis} is {value:g}; {scene.name} has {low:g} to {high:g}")
 
-    def notes(self, optics: Optics) -> tuple[str, ...]:
+    def notes(self, optics: Optics, scene: Scene) -> tuple[str, ...]:
         """Return a note for each value that the scene limits."""
         pairs = {
             "--focus": (self.focus, optics.focus_disparity),
             "--aperture": (self.aperture, optics.aperture_diameter),
+            "--focus-range": (self.focus_range, optics.focus_range),
         }
-        return tuple(
+        notes = [
             f"{name} {value:g} exceeds what the scene has; {used:g} is used."
             for name, (value, used) in pairs.items()
             if value not in (None, used)
-        )
+        ]
+        wanted = None if self.f_number is None else aperture_of(scene, self.f_number)
+        if self.f_number is not None and wanted is not None and wanted > optics.aperture_diameter > 0:
+            widest = self.f_number * wanted / optics.aperture_diameter
+            notes.append(f"--f-number {self.f_number:g} is wider than the lens opens; f/{widest:.2g} is used.")
+        if scene.plan is None and optics.aperture_diameter > max(scene.grid):
+            notes.append("The lens is wider than the light field: what no view shows is inpainted.")
+        return tuple(notes)
 
 
 def gloss_of(path: Path | None) -> Gloss | None:

@@ -23,7 +23,6 @@ from viewer.app.picture_files import export_picture, require_picture_place, shot
 from viewer.cli import options as shared
 from viewer.cli.messages import print_notes, show_progress
 from viewer.cli.option_records import flag, option, output_option, with_option_records
-from viewer.model import lens as lens_verbs
 from viewer.model import opening
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
@@ -92,7 +91,7 @@ def screenshot(
 
     Pictures up to the photo's own size (--size, --full) use all of its pixels, even if views are smaller.
 
-    Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
+    Example: iibr screenshot photo.png --focus-at 480,620 --f-number 1.8 --blades 7 -o out.png
     """
     source, depth_strength = scene.source(path, grid, focus_disparity), scene.depth_strength
     shared.require_heeded(context, path)
@@ -122,7 +121,7 @@ def screenshot(
 
         def set_lens(opened: Scene) -> Collection[Optics]:
             lens.require_within(opened)
-            viewer.state = _with_lens(viewer.state, settings, choice, display)
+            viewer.state = _with_lens(viewer, settings, choice, display)
             return viewer.optics_of_picture(_size_of(viewer, size, full))
 
         with show_progress("reading"):
@@ -137,7 +136,7 @@ def screenshot(
     own_size, view_size = (ImageSize(size.height, size.width) for size in (opened.own_size or opened.size, opened.size))
     unimportant = smaller_note(own_size, view_size) if draws_own else ""
     notes = (each for each in opened.notes if each != unimportant)
-    print_notes(note, *notes, *lens.notes(optics), origin=opened.depth_origin)
+    print_notes(note, *notes, *lens.notes(optics, opened), origin=opened.depth_origin)
 
 
 def _display(context: typer.Context, calibration: Path | None, output: Path) -> Calibration | None:
@@ -151,14 +150,11 @@ def _display(context: typer.Context, calibration: Path | None, output: Path) -> 
 
 
 def _with_lens(
-    state: AppState, settings: SavedSettings | None, choice: LensChoice, display: Calibration | None
+    viewer: OffscreenScene, settings: SavedSettings | None, choice: LensChoice, display: Calibration | None
 ) -> AppState:
     """Return the state with saved settings, and with lens and display of the options."""
-    state = state if settings is None else opening.take_settings(state, settings)
-    state = state if choice.eye is None else lens_verbs.move_eye(state, choice.eye)
-    state = state if choice.focus is None else lens_verbs.set_focus(state, choice.focus)
-    state = state if choice.aperture is None else lens_verbs.set_aperture(state, choice.aperture)
-    state = state if choice.gloss is None else lens_verbs.set_gloss(state, choice.gloss)
+    state = viewer.state if settings is None else opening.take_settings(viewer.state, settings)
+    state = replace(state, optics=choice.optics_on(viewer.scene, viewer.disparity, state.optics))
     return replace(state, stereo=Stereo(display=display, screen=state.optics.focus_disparity))
 
 

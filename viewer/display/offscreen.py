@@ -29,7 +29,7 @@ from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
 from viewer.background.maps import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
@@ -103,11 +103,11 @@ class OffscreenScene(ExitStack):
         assert isinstance(ready, SceneReady)
         self.do(do(opening.show_scene, ready.generation, ready.scene))
         self.state = replace(self.state, depth=depth)
+        self.view.open(ready)
+        self.inspection.open()
         pictures = pictures_of(ready.scene)
         if pictures is not None:
             wanted = views_seen_by(pictures, ready.scene)
-        self.view.open(ready)
-        self.inspection.open()
         for result in results:
             assert isinstance(result, ViewReady)
             self.view.add(result.view)
@@ -130,10 +130,15 @@ class OffscreenScene(ExitStack):
 
         def pictures_of(scene: Scene) -> Iterable[Optics] | None:
             on_ready(scene)
-            return None if optics_of is None else optics_of(scene, lens.optics_on(scene))
+            return None if optics_of is None else optics_of(scene, lens.optics_on(scene, self.disparity))
 
         scene = self.open(source, depth_strength, pictures_of=pictures_of)
-        return ExportSource(scene, self.view.loaded, lens.optics_on(scene), self.draw, self.view.centre)
+        return ExportSource(scene, self.view.loaded, lens.optics_on(scene, self.disparity), self.draw, self.view.centre)
+
+    @property
+    def disparity(self) -> FloatImage | None:
+        """The disparity of the centre view, None if the scene has none."""
+        return None if self.view.centre is None else self.view.centre.disparity
 
     @property
     def scene(self) -> Scene:

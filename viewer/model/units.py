@@ -8,14 +8,10 @@ from __future__ import annotations
 
 import math
 
+from iibr_core.scenes.f_numbers import disparity_as_given, equivalent_f_number, f_number
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Scene
 
-ASSUMED_DISTANCE_M = 2.0
-"""Assumed distance of the plane that stays still, at which the full-frame lens of an f-number is focused."""
-
-FULL_FRAME_WIDTH_M = 0.036
-EQUIVALENT_FOCAL_M = 0.085
 PROVISIONAL = "f/…"
 """Text of an f-number while the depth that it follows from is not known yet."""
 FARTHEST_M = 1000.0
@@ -24,14 +20,14 @@ FARTHEST_M = 1000.0
 
 def relative_distance(scene: Scene, disparity: float) -> float | None:
     """Return the distance of a field disparity, 1 for the plane that stays still; None if unknown or infinite."""
-    given = _disparity_as_given(scene, disparity)
-    still = _disparity_as_given(scene, 0.0)
+    given = disparity_as_given(scene, disparity)
+    still = disparity_as_given(scene, 0.0)
     return still / given if given is not None and still is not None and given > 0 and still > 0 else None
 
 
 def disparity_at(scene: Scene, distance: float) -> float | None:
     """Return the field disparity of a relative distance, the inverse of `relative_distance`."""
-    still = _disparity_as_given(scene, 0.0)
+    still = disparity_as_given(scene, 0.0)
     if still is None or scene.plan is None or still <= 0 or distance <= 0:
         return None
     return (still / distance - scene.plan.disparity_zero) * scene.plan.disparity_scale
@@ -42,35 +38,6 @@ def distance_limits(scene: Scene) -> tuple[float, float] | None:
     far, near = scene.disparity_range_px
     ends = relative_distance(scene, near), relative_distance(scene, far)
     return (ends[0], ends[1]) if ends[0] is not None and ends[1] is not None and ends[0] < ends[1] else None
-
-
-def f_number(scene: Scene, aperture_diameter: float) -> float | None:
-    """Return the f-number of an aperture in view steps, None if unknown and for a pinhole."""
-    still = _disparity_as_given(scene, 0.0)
-    if still is None or scene.plan is None or scene.focal_px is None or aperture_diameter <= 0:
-        return None
-    step_px = abs(scene.plan.disparity_scale) / scene.focal_px
-    if scene.inverse_metres is not None and scene.inverse_metres[0]:  # disparity counts inverse metres
-        view_step_m = step_px / abs(scene.inverse_metres[0])
-    elif still > 0:
-        view_step_m = step_px * still * ASSUMED_DISTANCE_M
-    else:
-        return None
-    focal_m = scene.focal_px / scene.width * FULL_FRAME_WIDTH_M
-    return focal_m / (aperture_diameter * view_step_m)
-
-
-def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
-    """Return the f-number of a full-frame portrait lens that blurs as much; None for a pinhole.
-
-    That lens is focused at `ASSUMED_DISTANCE_M` on the nearest surface, with the farthest one at infinity. Painted
-    depth does not count, as it does not change the lens.
-    """
-    far, near = scene.disparity_range_px
-    blur_px = aperture_diameter * (near - far if scene.found_span_px is None else scene.found_span_px)
-    if not blur_px > 0:
-        return None
-    return EQUIVALENT_FOCAL_M**2 / ASSUMED_DISTANCE_M * scene.width / FULL_FRAME_WIDTH_M / blur_px
 
 
 def f_number_text(scene: Scene, aperture_diameter: float) -> str:
@@ -111,11 +78,3 @@ def disparity_at_percent(scene: Scene, percent: float) -> float:
     """Return the field disparity of a position, the inverse of `far_percent`."""
     low, high = focus_limits(scene)
     return high - percent / 100 * (high - low)
-
-
-def _disparity_as_given(scene: Scene, disparity: float) -> float | None:
-    """Return the disparity as given, before the plan; None if no distance follows from it."""
-    plan = scene.plan
-    if scene.focal_px is None or plan is None or plan.disparity_scale == 0:
-        return None
-    return disparity / plan.disparity_scale + plan.disparity_zero

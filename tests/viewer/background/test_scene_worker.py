@@ -15,6 +15,7 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.method import ray_transformer
 from iibr_core.runtime import compiling
+from iibr_core.scenes.f_numbers import equivalent_f_number
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, ViewOffset, ViewUpdate
@@ -25,7 +26,6 @@ from viewer.background.scene_worker import Opened, PhotosFound, SceneResult, Sce
 from viewer.model import lens, opening
 from viewer.model.action import do
 from viewer.model.state.app_state import AppState
-from viewer.model.units import equivalent_f_number
 
 DEADLINE_S = 120.0
 VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)

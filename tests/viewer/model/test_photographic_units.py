@@ -8,18 +8,16 @@ from dataclasses import replace
 import pytest
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.scenes.f_numbers import ASSUMED_DISTANCE_M, equivalent_f_number, f_number
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
 from tests.viewer.model.test_opening import plan_of, scene_of
 from viewer.model.state.app_state import Hover
 from viewer.model.units import (
-    ASSUMED_DISTANCE_M,
     disparity_at,
     disparity_at_percent,
     distance_limits,
-    equivalent_f_number,
-    f_number,
     f_number_text,
     far_percent,
     metres,

@@ -8,6 +8,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import EXPOSURE_LIMIT_STOPS, RING_INNER_LIMIT, ApertureKind, ApertureShape
+from iibr_core.scenes.f_numbers import ASSUMED_DISTANCE_M, f_number
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, clamp, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, units
@@ -96,8 +97,8 @@ def _distance(state: AppState, scene: Scene) -> list[Action]:
 def aperture_slider(state: AppState, scene: Scene) -> list[Action]:
     """Build the aperture slider, in stops like the ring of a lens: a pinhole at the left, wide open at the right."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene)
-    words, is_exact = units.f_number_text(scene, diameter), units.f_number(scene, widest) is not None
-    exact_tip = METRIC_TIP if scene.inverse_metres is not None else F_NUMBER_TIP.format(units.ASSUMED_DISTANCE_M)
+    words, is_exact = units.f_number_text(scene, diameter), f_number(scene, widest) is not None
+    exact_tip = METRIC_TIP if scene.inverse_metres is not None else F_NUMBER_TIP.format(ASSUMED_DISTANCE_M)
     tip = APERTURE_TIP + (exact_tip if is_exact else EQUIVALENT_TIP)
     if state.preferences.units == "light field":
         form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"
