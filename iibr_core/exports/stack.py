@@ -13,17 +13,17 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_folder
-from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.lens_limits import aperture_of_disc
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 
-OPENED = 0.1
-"""Aperture as a share of the widest one, if an open aperture is needed and the window shows a closed one."""
+OPENED_DISC = 0.03
+"""Widest disc as a share of the picture's width, if an open aperture is needed and the window shows a closed one."""
 
 
 def open_diameter(scene: Scene, optics: Optics) -> float:
     """Return the diameter of the aperture in view steps, opened if it is closed."""
-    return optics.aperture_diameter or OPENED * aperture_limit(scene)
+    return optics.aperture_diameter or aperture_of_disc(scene, OPENED_DISC)
 
 
 def focal_stack(scene: Scene, optics: Optics, count: int) -> dict[str, Optics]:

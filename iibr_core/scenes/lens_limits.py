@@ -16,8 +16,8 @@ LONE_VIEW_MARGIN = 0.5
 """Largest distance of the viewpoint from a single row of views, in view steps."""
 WIDEST_DISC = 0.15
 """Diameter of the widest disc as a share of the picture's width."""
-FIRST_APERTURE = 0.1
-"""Share of the widest aperture that is opened by focusing: enough to see its effect."""
+FIRST_DISC = 0.03
+"""Widest disc, as a share of the picture's width, of the aperture that focusing opens: enough to see its effect."""
 BLADES_LIMITS = (3, 11)
 STEEPEST_TILT = 4.0
 """Steepest tilt from the picture's middle to its border, in spans of the focus: for tilt handles close together."""
@@ -67,15 +67,26 @@ def focus_span(scene: Scene) -> float:
 
 
 def aperture_limit(scene: Scene) -> float:
-    """Return the widest aperture in view steps; 0 for a single view without depth.
+    """Return the widest aperture in view steps; 0 for a single view.
 
     Focused on the middle of the scene's disparities, it blurs the nearest and the farthest by discs of WIDEST_DISC.
     Views without disparity allow as much as their grid.
     """
-    grid, (far, near) = float(max(scene.grid) if max(scene.grid) > 1 else 0), scene.disparity_range_px
+    grid = float(max(scene.grid) if max(scene.grid) > 1 else 0)
+    return max(grid, aperture_of_disc(scene, 2 * WIDEST_DISC))
+
+
+def aperture_of_disc(scene: Scene, share: float) -> float:
+    """Return the aperture in view steps whose widest disc, focused on the nearest, is this share of the width.
+
+    Views without disparity know no discs: their widest one counts as that of the whole grid. 0 for a single view.
+    """
+    far, near = scene.disparity_range_px
+    if max(scene.grid) == 1:
+        return 0.0
     if not scene.has_view_disparity or near <= far:
-        return grid
-    return max(grid, 2 * WIDEST_DISC * scene.width / (near - far))
+        return float(max(scene.grid)) * share / (2 * WIDEST_DISC)
+    return share * scene.width / (near - far)
 
 
 def is_finite(optics: Optics) -> bool:
@@ -123,7 +134,7 @@ def _within_limits(record: Record) -> Record:
 
 def first_aperture(scene: Scene) -> float:
     """Return the aperture, in view steps, to which focusing opens a pinhole; 0 for a single view."""
-    return FIRST_APERTURE * aperture_limit(scene)
+    return aperture_of_disc(scene, FIRST_DISC)
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,13 @@ from dataclasses import replace
 from math import isclose
 
 from iibr_core.beyond.optics import ApertureShape, Optics
-from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
+from iibr_core.scenes.lens_limits import aperture_of_disc, clamp_optics, focus_span
 from iibr_core.scenes.scene import Scene
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import PRESETS, PresetName
 
+PORTRAIT_DISC, MACRO_DISC = 0.05, 0.08
+"""Disc of the farthest background with the nearest in focus, as a share of the picture's width."""
 PORTRAIT_RANGE = 0.1
 """Sharp depth before and behind a portrait's focus, as a share of all disparity: a head and its shoulders."""
 
@@ -23,7 +25,8 @@ def preset_optics(name: PresetName, optics: Optics, scene: Scene, subject: float
     plain = replace(optics, focus_range=0.0, focus_tilt=(0.0, 0.0))
     if name == "everything sharp":
         return replace(plain, aperture_diameter=0.0)
-    plain = replace(plain, aperture_diameter=aperture_limit(scene), aperture_shape=ApertureShape())
+    aperture = aperture_of_disc(scene, MACRO_DISC if name == "macro" else PORTRAIT_DISC)
+    plain = replace(plain, aperture_diameter=aperture, aperture_shape=ApertureShape())
     if name == "macro":
         return replace(plain, focus_disparity=scene.disparity_range_px[1])
     focused = replace(plain, focus_disparity=subject, focus_range=PORTRAIT_RANGE * focus_span(scene))

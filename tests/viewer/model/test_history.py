@@ -101,8 +101,8 @@ def test_edits_before_another_plan_are_undone_in_its_units() -> None:
     assert reduce(state, do(history.undo)).optics.focus_disparity == pytest.approx(1.0)
 
 
-def test_undoing_depth_strength_brings_the_widest_aperture_and_its_preset_back() -> None:
-    """The grid of views follows the depth, and with it the widest aperture."""
+def test_undoing_depth_strength_brings_the_aperture_and_its_preset_back() -> None:
+    """Discs stay as wide as they are, so the aperture follows the depth."""
     few, many = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(13, 13), scale=1.0)
     before = scene_of(plan=few)
     state = after(state_with(before), do(lens.apply_preset, "portrait"), do(gesture.end_gesture))
@@ -110,6 +110,7 @@ def test_undoing_depth_strength_brings_the_widest_aperture_and_its_preset_back()
     state = after(state, do(lens.set_depth_strength, 2.0, True), do(gesture.end_gesture))
     wider = scene_of(GridShape(13, 13), plan=many, disparity_range_px=(-4.0, 6.0))
     state = reduce(state, do(opening.show_scene, state.generation, wider))
+    assert state.optics.aperture_diameter == pytest.approx(wanted / 2)
     state = reduce(state, do(history.undo))
     state = reduce(state, do(opening.show_scene, state.generation, before))
     assert state.optics.aperture_diameter == pytest.approx(wanted)

@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import APERTURE_KINDS, EXPOSURE_LIMIT_STOPS, ApertureShape, Optics
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.method.plan import ScenePlan
-from iibr_core.scenes.lens_limits import STEEPEST_TILT, aperture_limit, focus_limits, focus_span, is_finite
+from iibr_core.scenes.lens_limits import (
+    STEEPEST_TILT,
+    aperture_limit,
+    first_aperture,
+    focus_limits,
+    focus_span,
+    is_finite,
+)
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
@@ -77,7 +84,7 @@ def test_every_number_stays_finite_and_within_its_limits(
     assert low <= optics.focus_disparity <= high
     assert 0 <= optics.focus_range <= focus_span(scene)
     assert max(map(abs, optics.focus_tilt)) <= STEEPEST_TILT * focus_span(scene)
-    assert 0 <= optics.aperture_diameter <= (max(grid) if max(grid) > 1 else 0)
+    assert 0 <= optics.aperture_diameter <= aperture_limit(scene)
     assert 0 <= optics.highlight_recovery <= 1
     assert abs(optics.exposure_stops) <= EXPOSURE_LIMIT_STOPS
     assert 0 <= state.depth_strength <= DEPTH_STRENGTH_LIMIT
@@ -140,7 +147,7 @@ def test_a_portrait_has_a_sharp_subject_before_the_softest_background() -> None:
     assert portrait.focus_disparity == 1.5
     assert portrait.focus_range == pytest.approx(0.1 * focus_span(scene_of()))
     assert macro.focus_disparity == 3.0, "the nearest"
-    assert portrait.aperture_diameter == macro.aperture_diameter == aperture_limit(NINE)
+    assert 0 < portrait.aperture_diameter < macro.aperture_diameter < aperture_limit(scene_of())
     assert sharp.aperture_diameter == 0
 
 
@@ -161,7 +168,7 @@ def test_a_portrait_remembers_the_last_click_even_after_macro_and_another_plan()
 def test_the_first_focusing_opens_the_aperture(action: Action) -> None:
     """Through a pinhole everything is sharp: a click would seem to do nothing."""
     first = action.apply(state_with(scene_of()))
-    assert first.optics.aperture_diameter == 0.3 * aperture_limit(NINE)
+    assert first.optics.aperture_diameter == first_aperture(scene_of())
     assert history.undo(first).optics == Optics()
 
 
@@ -251,7 +258,7 @@ def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
     for plan in (flat, deep):
         state = opening.show_scene(state, 1, scene_of(plan.grid, plan=plan))
         assert is_finite(state.optics)
-        assert 0 <= state.optics.aperture_diameter <= max(plan.grid)
+        assert 0 <= state.optics.aperture_diameter <= aperture_limit(scene_of(plan.grid, plan=plan))
 
 
 def test_depth_strength_makes_the_field_again_and_ends_with_the_photo() -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.method.plan import ScenePlan
+from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
@@ -68,11 +69,13 @@ def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
 
 def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:
     state = state_with(scene_of(GridShape(5, 5)))
-    optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=20, focus_disparity=1)
+    optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=1e6, focus_disparity=1)
     saved = SavedSettings(optics, 1.0, Source(""), (10, 10))
     offered = reduce(state, do(messages.notify, Notice("It has settings.", offer=saved)))
     after = reduce(offered, do(opening.take_settings, saved))
-    assert after.optics == Optics(eye=ViewOffset(2, 2), aperture_diameter=5, focus_disparity=1)
+    assert after.optics == Optics(
+        eye=ViewOffset(2, 2), aperture_diameter=aperture_limit(state.scene), focus_disparity=1
+    )
     assert after.notices == ()
     assert reduce(after, do(history.undo)).optics == state.optics
     wider = replace(saved, view_width=2 * state.scene.width)
