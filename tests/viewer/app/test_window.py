@@ -173,23 +173,6 @@ def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer: Driver, 
     viewer.until(lambda app: any("no such file" in notice.text for notice in app.state.notices))
 
 
-def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
-    viewer: Driver, photo_path: Path
-) -> None:
-    photo_path.unlink()
-    scene = viewer.app.state.scene
-    assert scene is not None
-    viewer.slide("##Depth strength", 0.9)
-    assert viewer.app.state.generation == 2
-    assert viewer.app.state.depth_strength > 1
-    viewer.until(lambda app: app.scene_view.generation == 2)
-    viewer.until_idle()
-    again = viewer.app.state.scene
-    assert again is not None
-    assert again.disparity_range_px != scene.disparity_range_px or again.grid != scene.grid
-    assert not viewer.app.state.notices
-
-
 @pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [0, 0, 1e308, float("nan")]])
 def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
     open_window: Opener, tmp_path: Path, kept: list[float]

@@ -10,8 +10,9 @@ import pytest
 from PIL import Image, ImageCms
 
 from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
-from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
+from iibr_core.types import DISPLAY_P3, SRGB, GridShape, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
 from viewer.app.picture_files import export_picture, shot_of
 from viewer.display.offscreen import OffscreenScene
@@ -53,6 +54,28 @@ def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path):
         viewer.open(replace(viewer.scene.source, max_pixels=SIDE * SIDE))
         assert viewer.draws_own_pixels(viewer.scene.own_size)
         assert np.abs(middles(viewer.picture(viewer.scene.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
+
+
+@pytest.mark.parametrize(("name", "is_lost"), [("lamp.exr", False), ("lamp.png", True)])
+def test_highlights_glow_where_the_photo_lost_them_and_stay_where_it_has_them(tmp_path, name, is_lost):
+    """A lamp out of focus, in the views and at the photo's own size."""
+    light, disparity = np.full((64, 96, 3), 0.1, np.float32), np.full((64, 96), -1.0, np.float32)
+    light[24:32, 24:32], disparity[:, :48] = 4.0, 2.0
+    write_image(tmp_path / name, light if name.endswith("exr") else (255 * np.minimum(light, 1)).astype(np.uint8))
+    np.save(tmp_path / "lamp_disparity.npy", disparity)
+    with OffscreenScene() as viewer:
+        viewer.open(Source(str(tmp_path / name), grid=GridShape(3, 3), max_pixels=48 * 32))
+        viewer.do(do(lens.set_aperture, 2.0), do(lens.set_focus, viewer.scene.disparity_range_px[0]))
+        sizes = viewer.scene.size, viewer.scene.own_size
+        before = [viewer.picture(size, is_linear=True) for size in sizes]
+        viewer.do(do(lens.set_highlights, 1.0))
+        for size, plain in zip(sizes, before):
+            glowing = viewer.picture(size, is_linear=True)
+            if is_lost:
+                assert glowing.max() > 4 * plain.max()
+            else:
+                assert plain.max() > 1
+                np.testing.assert_allclose(glowing, plain, rtol=0.02, atol=0.002)
 
 
 @pytest.mark.parametrize(("name", "is_wide"), [("out.png", True), ("out.jpg", False)])
