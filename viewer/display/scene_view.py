@@ -133,6 +133,7 @@ class SceneView:
             self._hidden = surface
             self.renderer.set_hidden(surface)
             self.previews += 1
+            self._holds_picture = True  # until the first pass with the surface
 
     def add(self, view: ViewUpdate) -> None:
         """Take a view of the open scene, to be uploaded later. Raises InputError if there is no room for all views."""
