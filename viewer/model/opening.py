@@ -283,11 +283,12 @@ def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
 
 
 def _with_left_focus(state: AppState) -> AppState:
-    """Return the state with the focus that the photo was left with, unless the user chose another meanwhile."""
+    """Return the state with the focus and aperture that the photo was left with, unless the user focused meanwhile."""
     left = state.models.left_focus
     if left is None or state.chosen_focus is not None or state.scene is None:
         return state
-    optics = clamp_optics(with_focus_of(state.optics, left), state.scene)
+    optics = replace(with_focus_of(state.optics, left), aperture_diameter=left.aperture_diameter)
+    optics = clamp_optics(optics, state.scene)
     models = replace(state.models, left_focus=None)
     return replace(state, optics=optics, chosen_focus=optics.focus_disparity, models=models)
 

@@ -37,7 +37,6 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """A picture is at its best after few passes: how it looks then is tested in tests/viewer/gpu. A window at rest
     looks often whether there is anything new.
     """
-    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.MAX_CAMERAS", 48)
     monkeypatch.setattr("viewer.gpu.refocus.picture_lens.EDGE_PASSES", 2)
     monkeypatch.setattr("viewer.app.main_loop.IDLE_WAIT_S", 0.1)
     monkeypatch.setattr("viewer.app.pace.TOOLTIP_S", 0.1)

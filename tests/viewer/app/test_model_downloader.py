@@ -117,7 +117,8 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
     assert wall_slope(viewer) < 0.05, "all of the wall is as dark, and so as far away"
     square = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
     assert square != pytest.approx(before, abs=0.05)
-    assert (state.optics.eye, state.optics.aperture_diameter) == (ViewOffset(0.5, -0.5), 1.0)
+    assert state.optics.eye == ViewOffset(0.5, -0.5)
+    assert state.optics.aperture_diameter == pytest.approx(1.0, rel=0.2), "discs stay as wide as they were"
     assert sharp_disparity(state.optics, at) == pytest.approx(square, abs=0.02), "what was sharp is sharp"
     assert state.depth.edits == edits == viewer.app.scene_view.loaded.depth_settings.edits  # type: ignore[union-attr]
     assert offered_model(state) is None

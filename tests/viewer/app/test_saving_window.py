@@ -35,8 +35,6 @@ TINY = ScreenSize(48, 32)
 @pytest.fixture
 def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
     """One small step of a picture a turn, and many passes: so there are many turns however fast the machine is."""
-    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.MIN_CAMERAS", 64)
-    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.MAX_CAMERAS", 64)
     monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
     driver = open_window(photo_path, grid=GridShape(3, 3))
