@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene, reduce
+from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import inspection, lens, messages, opening, preferences, saving, viewpoint, window
 from viewer.model.action import Action, do
@@ -87,19 +88,28 @@ def test_what_lies_over_the_picture_is_seen_where_it_belongs(
     assert rows[0] <= found.min() < found.max() < rows[1]
 
 
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Sentences that the panel shows."""
+    found: list[str] = []
+    watch_widgets(monkeypatch, ("text_wrapped",), found, lambda kind, arguments: found.append(arguments[0]))
+    return found
+
+
 @pytest.mark.parametrize(
-    "action",
+    ("action", "words"),
     [
-        do(viewpoint.set_loop, "eight"),
-        do(lens.set_aperture, 2.0),
-        do(opening.set_progress, 1, Progress(4, 9, 0.3)),
-        do(window.set_report, DrawReport(3, 9, 12.0)),
+        (do(viewpoint.set_loop, "eight"), None),
+        (do(lens.set_aperture, 2.0), None),
+        (do(opening.set_progress, 1, Progress(4, 9, 0.3)), "4 of 9 views"),
+        (do(window.set_report, DrawReport(3, 9, 12.0)), "Drawn in 12 ms, refining"),
     ],
-    ids=lambda action: type(action).__name__,
+    ids=lambda value: type(value).__name__,
 )
-def test_the_panel_tells(viewer: OffscreenScene, action: Action) -> None:
+def test_the_panel_tells(viewer: OffscreenScene, said: list[str], action: Action, words: str | None) -> None:
     viewer.do(do(preferences.toggle_section, "scene"))
     assert in_panel(changed_after(viewer, action)).sum() > ENOUGH_PIXELS
+    assert words is None or words in said
 
 
 def test_light_and_dark(viewer: OffscreenScene) -> None:
@@ -120,7 +130,7 @@ def test_what_is_under_way_in_words() -> None:
     assert job_text(JobProgress(2, "export", "a.mp4")) == "waiting for its turn"
 
 
-def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: OffscreenScene) -> None:
+def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: OffscreenScene, said: list[str]) -> None:
     preferences = replace(viewer.state.preferences, open_sections=with_sections((), "scene"))
     viewer.state = replace(viewer.state, preferences=preferences)
     before = viewer.screen(SIZE).astype(int)
@@ -129,6 +139,7 @@ def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: OffscreenS
     changed = np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24
     assert in_panel(changed).sum() > ENOUGH_PIXELS
     assert not changed[:, : -int(PANEL_WIDTH)].any()
+    assert "7.3 % of the map is unknown." in said
 
 
 def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(
