@@ -110,7 +110,7 @@ export function blendedSamples(points, eye, field) {
     return kept.map((view) => ({ t: view.t - eye.t, s: view.s - eye.s, view, weight: view.weight / total }));
 }
 
-// ---- The lens of one picture: see picture_lens.py
+// ---- The lens of one picture: its cameras are added up in passes, where the desktop blurs slices (see discs.py)
 
 export function lensOf(optics, field, widthPx, level = NUMBERS.LEVELS[0]) {
     const diameter = Math.max(optics.aperture, 0), widest = Math.max(field.rows, field.columns);
@@ -154,7 +154,8 @@ export function samplesOf(lens, field, passIndex) {
     if (!field.hasDisparity) {
         return blendedSamples(aperturePoints(diameter, widest, NUMBERS.BLEND_POINTS, passIndex), eye, field);
     }
-    const points = aperturePoints(diameter, widest, count, passIndex, cellOf(lens, passIndex));
+    const points = aperturePoints(diameter, widest, count, passIndex, cellOf(lens, passIndex))
+        .map(({ t, s }) => ({ t: t / field.rowStep, s }));  // the lens is round, however far rows stand apart
     return answeredSamples(points, passIndex * count, eye, field);
 }
 

@@ -1,20 +1,17 @@
 import json
 import shutil
 import subprocess
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
 from iibr_core.beyond.aperture_sampling import aperture_points
-from iibr_core.beyond.optics import ApertureShape, Optics
-from iibr_core.beyond.picture_quality import QUALITY_LEVELS, page_numbers
+from iibr_core.beyond.optics import ApertureShape
+from iibr_core.beyond.picture_quality import page_numbers
 from iibr_core.exports.web import page_script
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import SRGB, GridShape, ViewOffset
-from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples
 
 WEB = resource_folder("web")
@@ -116,36 +113,6 @@ def test_views_that_answer_are_the_desktops(name, samples_of, step) -> None:
         eye_there = ViewOffset(eye.t / step, eye.s / step)
         wanted = samples_of(points / step, *first, eye_there, grid, np.ones(grid, bool))
         assert found_weights(samples) == pytest.approx(wanted_weights(wanted, grid, step)), eye
-
-
-@pytest.mark.parametrize("has_disparity", [True, False])
-@pytest.mark.parametrize("diameter", [0.0, *DIAMETERS])
-def test_a_lens_is_the_desktops(diameter, has_disparity) -> None:
-    code = """given.map(({ eye, aperture, widthPx, level, passIndex, hasDisparity }) => {
-        const places = Array.from({ length: 35 }, (_, i) => [`${Math.floor(i / 7) - 2},${i % 7 - 3}`, i]);
-        const there = { ...field, hasDisparity, layers: new Map(places) };
-        const lens = renderer.lensOf({ eye, focus: 0.5, aperture }, there, widthPx, renderer.NUMBERS.LEVELS[level]);
-        return {
-            cameras: lens.camerasPerPass, blurPx: lens.blurPx, passes: renderer.passCount(lens, there),
-            cell: renderer.cellOf(lens, passIndex), samples: renderer.samplesOf(lens, there, passIndex),
-        };
-    })"""
-    drawn = ((0, 0), (0, 3), (1, 0), (4, 0), (6, 0))
-    asked = [(eye, width, *one) for eye in EYES for width in (48, 190, 960) for one in drawn]
-    told_lenses = [
-        {"eye": told(eye), "widthPx": width, "level": level, "passIndex": index}
-        | {"aperture": diameter, "hasDisparity": has_disparity}
-        for eye, width, level, index in asked
-    ]
-    field = cast(LightFieldTexture, SimpleNamespace(**DESKTOP_FIELD, has_disparity=np.full(GRID, has_disparity)))
-    for (eye, width, level, index), found in zip(asked, node(code, told_lenses)):
-        optics = Optics(eye=eye, focus_disparity=0.5, aperture_diameter=diameter)
-        lens = lens_of(optics, field, width, QUALITY_LEVELS[level])
-        assert found["cameras"] == lens.cameras_per_pass
-        assert found["blurPx"] == pytest.approx(lens.blur_px)
-        assert found["passes"] == lens.pass_count(field)
-        assert found["cell"] == pytest.approx(lens.cell(index))
-        assert found_weights(found["samples"]) == pytest.approx(wanted_weights(lens.samples(field, index), GRID))
 
 
 def test_a_tap_finds_the_first_surface_on_its_ray() -> None:

@@ -136,7 +136,7 @@ def test_the_field_is_described_and_the_first_picture_is_the_middle(opened) -> N
     assert {(at["t"], at["s"]) for at in field["order"]} == {(t, s) for t in range(-2, 3) for s in range(-2, 3)}
     low, high = scene.disparity_range_px
     assert field["range"] == pytest.approx([low - 0.05 * (high - low), high + 0.05 * (high - low)], abs=0.01)
-    assert (field["apertureLimits"], field["firstAperture"]) == ([0, 5], pytest.approx(1.5))
+    assert (field["apertureLimits"], field["firstAperture"]) == ([0, 5], pytest.approx(3.0))
     assert field["focusLimits"] == pytest.approx(focus_limits(scene))
     letters = re.search(r'src="data:image/avif;base64,([^"]*)"', text)
     with Image.open(BytesIO(base64.b64decode(letters[1]))) as image:
