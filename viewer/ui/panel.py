@@ -44,6 +44,8 @@ MORE_TOOLS = (
 )
 START_TOOLS = (MORE_TOOLS[1], TOOLS[5])
 READY = "Ready"
+SEEN = "sections seen"
+"""Name of the note that sections were built before: those that are open at first are not scrolled to."""
 STATUS_LINES = 2
 """Height of the words on progress, in lines."""
 HINT = "Drag the picture to look around it, click to focus."
@@ -96,6 +98,7 @@ def _picture(state: AppState, scene: Scene) -> list[Action]:
     gap()
     for section in SECTIONS:
         actions += _section(section, state, scene)
+    imgui.get_state_storage().set_bool(imgui.get_id(SEEN), True)
     return actions
 
 
@@ -205,7 +208,8 @@ def _show_whole(section: Section, is_open: bool, top: float) -> None:
     """Scroll to a section that was just opened, as far as its heading stays in sight. top: of its content."""
     before, key, row = imgui.get_state_storage(), imgui.get_id(f"open {section}"), imgui.get_frame_height_with_spacing()
     wanted_y = imgui.get_cursor_pos_y() + row - imgui.get_window_height()
-    if is_open and not before.get_bool(key, True) and wanted_y > imgui.get_scroll_y():
+    was_open = before.get_bool(key, not before.get_bool(imgui.get_id(SEEN)))
+    if is_open and not was_open and wanted_y > imgui.get_scroll_y():
         imgui.set_scroll_y(min(top - row, wanted_y))
     before.set_bool(key, is_open)
 
