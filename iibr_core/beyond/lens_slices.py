@@ -20,13 +20,13 @@ Doubles = NDArray[np.float64]
 
 MAX_SLICES = 32
 """Largest number of slices: a block of the picture has one bit for each."""
-MIN_SPACING_PX, SPACING_SHARE = 1.5, 0.15
+MIN_SPACING_PX, SPACING_SHARE = 1.5, 0.2
 """Largest difference of the discs in a slice: in pixels, and as a share of their diameter. The larger one counts."""
 COARSER = 1.25
 """Factor on the differences if there are too many slices."""
 SHARP_PX = 0.7
 """Diameter of a disc, in pixels, that blurs nothing."""
-WIDEST_TEXELS = 28.0
+WIDEST_TEXELS = 19.0
 """Diameter of a disc, in pixels of the size at which it is drawn, from which on the size is halved."""
 MAX_TAPS = 320
 """Largest number of samples of a disc: a square mask turned by 45 degrees takes as many."""
