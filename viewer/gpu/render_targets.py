@@ -14,6 +14,13 @@ KEPT_SIZES = 2
 """Number of picture sizes whose targets are kept: a picture drawn quickly is smaller than the next."""
 
 
+def clear(framebuffer: Any) -> None:
+    """Clear all of a framebuffer; without this, the part of the one that was bound before is the limit."""
+    framebuffer.scissor = None
+    framebuffer.use()
+    framebuffer.clear()
+
+
 class RenderTarget:
     """An RGBA texture of a size and its framebuffer. dtype: "f1" for bytes, "f4" for floats."""
 

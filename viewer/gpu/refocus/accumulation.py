@@ -13,6 +13,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.passes import Passes, ProgressiveAccumulation, Rows
+from viewer.gpu.render_targets import clear
 
 MIN_ROWS = 16
 """Smallest number of rows of a step: fewer rows save no time, because a draw has a cost of its own."""
@@ -71,7 +72,7 @@ class Accumulator:
         self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, target: moderngl.Framebuffer
     ) -> None:
         """Draw the disparity that the eye sees, after a pass."""
-        target.clear()
+        clear(target)
         if accumulation.samples is not None:
             batch, rows = accumulation.samples.part(0, 1), (0, target.size[1])
             self.passes.draw_lens(field, accumulation, batch, target, rows, is_disparity=True)
@@ -88,7 +89,7 @@ class Accumulator:
         """Draw the next cameras of a pass, at most `count`, in bands of rows."""
         lens, at = accumulation.drawn_lens, accumulation.at
         if at == 0 and accumulation.pass_index == 0:
-            target.clear()
+            clear(target)
         if not field.present.any():
             accumulation.pass_index = accumulation.passes
             return

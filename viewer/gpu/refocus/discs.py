@@ -20,6 +20,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.refocus.picture_lens import BARREL_EDGE, Lens, grown
+from viewer.gpu.render_targets import clear
 
 TILE_PX = 512
 """Side of a tile in pixels."""
@@ -130,7 +131,7 @@ class Discs:
         self._texture("light", (width, len(SURFACES) * height), 4, self._dtype)
         self._texture("defocus", (width, len(SURFACES) * height), 1, "f4")
         framebuffer = self._framebuffer("light", "defocus")
-        framebuffer.clear()
+        clear(framebuffer)
         for unit, texture in ((PINHOLE, pinhole), (SEEN, seen)):
             texture.use(unit)
         part = grown(lens.part, lens.margin_px, ScreenSize(width - 2 * lens.margin_px, height - 2 * lens.margin_px))
@@ -191,7 +192,7 @@ class Discs:
 
     def _draw_slices(self, lens: Lens, places: list[_Place], block_px: int) -> None:
         framebuffer, tents = self._framebuffer("slices"), _tents(lens.slices)
-        framebuffer.clear()
+        clear(framebuffer)
         program = self._programs.get("slice.frag", vertex="blocks.vert")
         width, height = self._textures["light"].size
         self._use_surfaces(program, ScreenSize(width, height // len(SURFACES)))
@@ -211,7 +212,7 @@ class Discs:
         block_px: int,
     ) -> None:
         framebuffer, is_cat_eye = self._framebuffer("blurred"), lens.optics.aperture_shape.kind == "cat_eye"
-        framebuffer.clear()
+        clear(framebuffer)
         program = self._programs.get("disc.frag", {"CAT_EYE": is_cat_eye}, vertex="blocks.vert")
         self._textures["slices"].use(ATLAS)
         program.set_uniforms(atlas=ATLAS)
