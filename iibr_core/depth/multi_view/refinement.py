@@ -13,11 +13,11 @@ from iibr_core.runtime.tiling import in_bands
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 
-HIDDEN_DIFFERENCE = 0.008
+HIDDEN_DIFFERENCE = 0.01
 """Difference of texture (1 = white) at which a view weighs a quarter, as hidden (weights of Geman and McClure)."""
 SMOOTHNESS = 1e-2
 """Weight of bends of the map."""
-EDGE_COLOR = 0.025
+EDGE_COLOR = 0.05
 """Edge of a channel (1 = white) at which bends weigh a third."""
 EDGE_DISPARITY = 0.1
 """Bend of the map (px per view step) that weighs a quarter, as an edge."""
