@@ -44,8 +44,6 @@ MORE_TOOLS = (
 )
 START_TOOLS = (MORE_TOOLS[1], TOOLS[5])
 READY = "Ready"
-SEEN = "sections seen"
-"""Name of the note that sections were built before: those that are open at first are not scrolled to."""
 STATUS_LINES = 2
 """Height of the words on progress, in lines."""
 HINT = "Drag the picture to look around it, click to focus."
@@ -98,7 +96,6 @@ def _picture(state: AppState, scene: Scene) -> list[Action]:
     gap()
     for section in SECTIONS:
         actions += _section(section, state, scene)
-    imgui.get_state_storage().set_bool(imgui.get_id(SEEN), True)
     return actions
 
 
@@ -200,18 +197,18 @@ def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
     toggled: list[Action] = [do(preferences.toggle_section, section)] if is_toggled else []
     top = imgui.get_cursor_pos_y()
     actions = toggled + (BUILDERS[section](state, scene) if is_open else [])
-    _show_whole(section, is_open, top)
+    _show_whole(section, is_open, is_toggled, top)
     return actions
 
 
-def _show_whole(section: Section, is_open: bool, top: float) -> None:
-    """Scroll to a section that was just opened, as far as its heading stays in sight. top: of its content."""
-    before, key, row = imgui.get_state_storage(), imgui.get_id(f"open {section}"), imgui.get_frame_height_with_spacing()
+def _show_whole(section: Section, is_open: bool, is_pressed: bool, top: float) -> None:
+    """Scroll to a section that was opened by its heading, as far as the heading stays in sight. top: of its content."""
+    pressed, key = imgui.get_state_storage(), imgui.get_id(f"open {section}")
+    row = imgui.get_frame_height_with_spacing()
     wanted_y = imgui.get_cursor_pos_y() + row - imgui.get_window_height()
-    was_open = before.get_bool(key, not before.get_bool(imgui.get_id(SEEN)))
-    if is_open and not was_open and wanted_y > imgui.get_scroll_y():
+    if is_open and pressed.get_bool(key) and wanted_y > imgui.get_scroll_y():
         imgui.set_scroll_y(min(top - row, wanted_y))
-    before.set_bool(key, is_open)
+    pressed.set_bool(key, is_pressed and not is_open)
 
 
 def _more(state: AppState, scene: Scene) -> list[Action]:

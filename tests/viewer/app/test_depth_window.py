@@ -127,6 +127,26 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
     assert is_far[given == NEAR].mean() > 0.7
 
 
+def test_a_section_that_is_opened_at_the_bottom_comes_into_sight(viewer: Driver) -> None:
+    sections = tuple(section for section in SECTIONS if section != "depth")
+    viewer.app.state = replace(
+        viewer.app.state, preferences=replace(viewer.app.state.preferences, open_sections=sections)
+    )
+    viewer.until_idle()
+    panel = imgui.internal.find_window_by_name("panel")
+    _, y = viewer.find("###section Depth")
+    if panel.pos.y + panel.size.y - y > 80:  # scroll up, so that the heading lies at the bottom
+        panel.scroll.y -= panel.pos.y + panel.size.y - y - 40
+        viewer.until_idle()
+        _, y = viewer.find("###section Depth")
+    before = panel.scroll.y
+    viewer.send("click", 1)
+    viewer.until(lambda app: "depth" in app.state.preferences.open_sections)
+    viewer.until_idle()
+    assert panel.scroll.y > before
+    assert viewer.find("###section Depth")[1] < y
+
+
 def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer: Driver) -> None:
     """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
     sections = tuple(section for section in SECTIONS if section != "depth")
