@@ -86,7 +86,10 @@ def test_the_divider_is_dragged_and_the_viewpoint_stays(viewer: Driver) -> None:
 
 def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver) -> None:
     viewer.app.do(
-        *(do(preferences.toggle_section, section) for section in ("view", "focus", "aperture", "light", "inspect"))
+        *(
+            do(preferences.toggle_section, section)
+            for section in ("more", "view", "focus", "aperture", "light", "inspect")
+        )
     )
     viewer.until_idle()
     viewer.press("Values")
