@@ -25,6 +25,8 @@ from iibr_core.types import FloatImage, StoredColors, ViewOffset
 DIAGONAL = math.sqrt(2)
 STRAY = 0.5
 """Share of the size of a depth edge by which a filled disparity must lie behind the photo's."""
+MIXED_PX = 3
+"""Distance from a nearer surface up to which the pixels of a view may show some of it, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +74,10 @@ def hidden_surface(
         mask = np.ones(behind.shape, np.bool_) if view.mask is None else view.mask
         view_colors = np.ascontiguousarray(encoded_from_stored(view.colors), np.float32)
         _land(view_colors, view.disparity, mask, *map(float, view.offset), disparity, edge, (background, behind, known))
-    open_hole = hole & ~known
-    if open_hole.any():
+    mixed = np.zeros_like(hole)
+    _mark_mixed(disparity, edge, mixed)
+    open_hole = hole & ~known | mixed
+    if not open_hole.all():
         fill_behind(background, behind, open_hole, disparity, edge, threads)
     return HiddenSurface(background, behind, ~hole | (behind < disparity - STRAY * edge))
 
@@ -110,6 +114,25 @@ def _lowest_within_reach(disparity, slope, lowest):
 
 
 @kernel
+def _is_beside_foreground(disparity, y, x, edge):
+    """Return whether a pixel may be mixed with a nearer surface: one lies within MIXED_PX of it."""
+    height, width = disparity.shape
+    for v in range(max(y - MIXED_PX, 0), min(y + MIXED_PX + 1, height)):
+        for u in range(max(x - MIXED_PX, 0), min(x + MIXED_PX + 1, width)):
+            if is_in_front(disparity[v, u], disparity[y, x], edge):
+                return True
+    return False
+
+
+@kernel
+def _mark_mixed(disparity, edge, mixed):
+    """Mark the pixels (H, W) beside a nearer surface, whose colours may show some of it."""
+    for y in range(disparity.shape[0]):
+        for x in range(disparity.shape[1]):
+            mixed[y, x] = _is_beside_foreground(disparity, y, x, edge)
+
+
+@kernel
 def _land(colors, disparity, mask, t, s, photo_disparity, edge, surface):
     """Write the pixels of a view that land behind the photo's surfaces, the nearest first, into (colours, disparity,
     known).
@@ -125,6 +148,8 @@ def _land(colors, disparity, mask, t, s, photo_disparity, edge, surface):
             if not (0 <= v < height and 0 <= u < width and is_in_front(photo_disparity[v, u], d, edge)):
                 continue
             if behind[v, u] < photo_disparity[v, u] and behind[v, u] >= d:
+                continue
+            if _is_beside_foreground(disparity, y, x, edge):
                 continue
             behind[v, u], known[v, u] = d, True
             for c in range(3):

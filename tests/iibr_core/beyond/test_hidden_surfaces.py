@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from iibr_core.beyond.hidden_surfaces import MIXED_PX, SeenBehind, hidden_surface
+from iibr_core.types import ViewOffset
+
+SIZE = 60, 80
+SQUARE = np.s_[20:40, 25:55]
+WALL, DARK = 0.8, 0.1
+
+
+def scene() -> tuple[np.ndarray, np.ndarray]:
+    """Return colours and disparity of a dark square before a light wall; the wall beside it is half dark."""
+    colors, disparity = np.full((*SIZE, 3), WALL, np.float32), np.zeros(SIZE, np.float32)
+    colors[19:41, 24:56] = (WALL + DARK) / 2
+    colors[SQUARE], disparity[SQUARE] = DARK, 3.0
+    return colors, disparity
+
+
+def test_nothing_of_the_foreground_is_seen_behind_it() -> None:
+    colors, disparity = scene()
+    hidden = hidden_surface(colors, disparity, 4.0)
+    behind = hidden.mask & (disparity > 1)
+    assert behind[SQUARE].mean() > 0.9
+    np.testing.assert_allclose(hidden.disparity[behind], 0.0, atol=0.05)
+    np.testing.assert_allclose(hidden.colors[behind], WALL, atol=0.02)
+
+
+def test_views_that_saw_the_wall_show_it_but_for_their_mixed_pixels() -> None:
+    colors, disparity = scene()
+    beside, moved = ViewOffset(0.0, 2.0), np.roll(disparity, -6, axis=1)
+    view = np.where(moved[..., None] > 1, DARK, np.float32([0.2, 0.6, 0.2]))
+    reach = np.roll(moved, 1, axis=1) > 1  # the pixel right of the square shows both
+    view[reach & (moved < 1)] = DARK
+    stored = np.rint(255 * view).astype(np.uint8)
+    hidden = hidden_surface(colors, disparity, 4.0, [SeenBehind(beside, stored, moved, moved < 1)])
+    seen = np.s_[22:38, 55 - 6 + MIXED_PX + 1 : 55]
+    np.testing.assert_allclose(hidden.colors[seen], np.broadcast_to((0.2, 0.6, 0.2), (16, 2, 3)), atol=0.05)
+    assert hidden.colors[SQUARE].min() > 0.15, "no dark pixel"
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (2, 2)])
+def test_small_pictures_and_pinholes_hide_nothing(shape) -> None:
+    disparity = np.arange(shape[0] * shape[1], dtype=np.float32).reshape(shape)
+    for radius in (0.0, 1e-3, 1e6):
+        hidden = hidden_surface(np.ones((*shape, 3), np.float32), disparity, radius)
+        assert np.isfinite(hidden.colors).all()
+        assert np.isfinite(hidden.disparity).all()
