@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
+from iibr_core.depth.guess import box_filter
 from iibr_core.depth.multi_view.matching import HIDDEN_FACTOR
 from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
@@ -69,7 +69,7 @@ def find_stripes(costs: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[n
     """
     matches, limits = np.empty(costs.shape[:2], np.float32), np.empty(costs.shape[:2], np.uint8)
     _count_matches(costs, matches, limits)
-    return uniform_filter(np.float32(matches > 1), STRIPE_PX) > 0.5, limits
+    return box_filter(np.float32(matches > 1), STRIPE_PX // 2) > 0.5, limits
 
 
 @kernel

@@ -104,7 +104,7 @@ def test_paths_are_closed_and_move(source, motion) -> None:
     steps = np.linalg.norm(np.diff(around, axis=0, append=around[:1]), axis=1)
     assert steps.max() > 0.01
     assert steps[-1] <= steps.max(), "no leap from the last to the first"
-    assert all(0 <= optics.aperture_diameter <= aperture_limit(source.scene.grid) for optics in path)
+    assert all(0 <= optics.aperture_diameter <= aperture_limit(source.scene) for optics in path)
 
 
 def test_a_rack_rests_on_both_surfaces_and_glides_between_them(source) -> None:

@@ -66,6 +66,12 @@ def everything(driver: Driver) -> None:
     change(do(inspection.compare, None), do(inspection.set_overlay, None))
 
 
+def leave_picture(driver: Driver) -> None:
+    """Move the pointer to where it points at nothing."""
+    driver.send("mousemove", 3, 3)
+    driver.until(lambda app: app.state.hover is None)
+
+
 def seen(driver: Driver) -> list[np.ndarray]:
     """Return the window's picture at rest, from a corner, with each map, with an open lens and with gloss."""
     app, pictures = driver.app, []
@@ -77,8 +83,7 @@ def seen(driver: Driver) -> list[np.ndarray]:
     )  # fmt: skip
     for actions in looks:
         app.do(*actions)
-        driver.send("mousemove", 3, 3)
-        driver.until(lambda app: app.state.hover is None)
+        leave_picture(driver)
         driver.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
         driver.until_idle()
         place, frame = app.window.place, app.layout().frame
@@ -108,6 +113,7 @@ def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window: Opener, tm
     driver.until_idle()
     everything(driver)
     before = of_the_photo(driver.app.state)
+    leave_picture(driver)
     driver.app.do(do(opening.open_source, Source(str(after), grid=GRID)))
     driver.until(lambda app: app.state.scene is not None and app.state.scene.name == "next")
     driver.until_idle()
@@ -115,6 +121,7 @@ def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window: Opener, tm
     driver.close()
     fresh = open_window(after, grid=GRID)
     fresh.until_idle()
+    leave_picture(fresh)
     expected = of_the_photo(fresh.app.state)
     assert sum(before[name] != expected[name] for name in expected) > 10, "much was changed"
     assert state == expected

