@@ -23,8 +23,6 @@ SMALL_SIDE_PX = 160
 """Longer side of the small copy."""
 MAX_STEPS = 512
 """Largest number of disparities of a sweep; a wider range is swept more coarsely."""
-MIN_STRIPED = 0.002
-"""Smallest share of stripes for which surfaces are found twice."""
 FEW_VIEWS_STEP = 2 / 3
 """Share of the usual number of disparities that few views are matched at."""
 MIN_SURENESS = 0.4
@@ -182,7 +180,7 @@ def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> _Match:
     """Match every pixel; a median smooths single pixels away."""
     costs = sweep(views, disparities)
     is_striped, limits = find_stripes(costs)
-    if is_striped.mean() > MIN_STRIPED:
+    if is_striped.any():
         # First without the costs of stripes: the surfaces around them reach across. 0 decides at equal distance.
         blank = np.where(is_striped[..., None], np.uint8(0), costs)
         near = choose_disparity(blank, views.colors, disparities, is_striped)[0] * (not is_striped.all())

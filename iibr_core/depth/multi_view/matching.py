@@ -43,6 +43,8 @@ HIDDEN_FACTOR = 1.5
 """Factor by which a group of the views must match better than all, so that the others count as hidden."""
 HIDDEN_DIFFERENCE = 0.0012
 """Difference of texture (1 = white) that a group costs at least: outlines of plain objects count by it."""
+MIN_LINE_VIEWS = 4
+"""Smallest number of views on a line that count as a group: two of them match along outlines at any disparity."""
 LINE_SINE = 0.3
 """Sine of the largest angle between the views of one line."""
 MIN_SEEN_SHARE = 0.3
@@ -116,9 +118,10 @@ def view_groups(offsets: NDArray[np.float32]) -> NDArray[np.bool_]:
     """
     t, s = offsets.T
     angle = np.arctan2(t, s)
-    lines = [np.abs(np.sin(angle - at * np.pi / 4)) < LINE_SINE for at in range(4)]
     everything = np.hypot(t, s) > 0
-    groups = [np.asarray(group) & everything for group in (s < 0, s > 0, t < 0, t > 0, *lines)]
+    lines = [np.asarray(np.abs(np.sin(angle - at * np.pi / 4)) < LINE_SINE) & everything for at in range(4)]
+    lines = [line for line in lines if np.count_nonzero(line) >= MIN_LINE_VIEWS]
+    groups = [np.asarray(side) & everything for side in (s < 0, s > 0, t < 0, t > 0)] + lines
     return np.stack([*(group for group in groups if group.any() and (group != everything).any()), everything])
 
 

@@ -57,7 +57,7 @@ def test_views_that_converge_are_cropped_around_their_principal_points(iibr: Iib
         )
         np.testing.assert_array_equal(seen[row, column], points[:, 3:])
     output_of(iibr("depth", "out", "-o", "found.npy"))
-    assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.05), "it opens again as a light field"
+    assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.08), "it opens again as a light field"
 
 
 def test_rows_closer_than_columns_stay_so(iibr: Iibr, folder: Path) -> None:
