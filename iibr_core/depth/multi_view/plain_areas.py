@@ -69,7 +69,7 @@ def find_stripes(costs: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[n
     """
     matches, limits = np.empty(costs.shape[:2], np.float32), np.empty(costs.shape[:2], np.uint8)
     _count_matches(costs, matches, limits)
-    return box_filter(np.float32(matches > 1), STRIPE_PX // 2) > 0.5, limits
+    return box_filter((matches > 1).astype(np.float32), STRIPE_PX // 2) > 0.5, limits
 
 
 @kernel
