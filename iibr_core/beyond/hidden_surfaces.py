@@ -74,10 +74,8 @@ def hidden_surface(
         mask = np.ones(behind.shape, np.bool_) if view.mask is None else view.mask
         view_colors = np.ascontiguousarray(encoded_from_stored(view.colors), np.float32)
         _land(view_colors, view.disparity, mask, *map(float, view.offset), disparity, edge, (background, behind, known))
-    mixed = np.zeros_like(hole)
-    _mark_mixed(disparity, edge, mixed)
-    open_hole = hole & ~known | mixed
-    if not open_hole.all():
+    open_hole = hole & ~known
+    if open_hole.any():
         fill_behind(background, behind, open_hole, disparity, edge, threads)
     return HiddenSurface(background, behind, ~hole | (behind < disparity - STRAY * edge))
 
@@ -122,14 +120,6 @@ def _is_beside_foreground(disparity, y, x, edge):
             if is_in_front(disparity[v, u], disparity[y, x], edge):
                 return True
     return False
-
-
-@kernel
-def _mark_mixed(disparity, edge, mixed):
-    """Mark the pixels (H, W) beside a nearer surface, whose colours may show some of it."""
-    for y in range(disparity.shape[0]):
-        for x in range(disparity.shape[1]):
-            mixed[y, x] = _is_beside_foreground(disparity, y, x, edge)
 
 
 @kernel
