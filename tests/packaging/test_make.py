@@ -1,4 +1,4 @@
-"""What `make` sets up in a checkout, with a package that is there already in place of those from the network."""
+"""The environment of `make` in a checkout, with a package that is there already in place of those from the network."""
 
 from __future__ import annotations
 

@@ -50,10 +50,7 @@ def size_from_text(text: str) -> ScreenSize:
 
 def view_from_text(text: str) -> ViewOffset:
     """Return a view offset from "S,T": steps to the right, then down. Raises BadParameter."""
-    try:
-        s, t = map(number_from_text, text.split(","))
-    except (ValueError, typer.BadParameter):
-        raise typer.BadParameter(f"{text!r} is not a viewpoint: give S,T in view steps, such as 2,-1.5") from None
+    s, t = _two_numbers(text, "is not a viewpoint: give S,T in view steps, such as 2,-1.5")
     return ViewOffset(t, s)
 
 
@@ -66,11 +63,16 @@ class Pair(NamedTuple):
 
 def pair_from_text(text: str) -> Pair:
     """Return two numbers from "X,Y". Raises BadParameter."""
+    return _two_numbers(text, "are not two numbers: give X,Y, such as 480,620")
+
+
+def _two_numbers(text: str, problem: str) -> Pair:
+    """Return two numbers with a comma between them. problem: words behind the text in a BadParameter."""
     try:
-        x, y = map(number_from_text, text.split(","))
+        first, second = map(number_from_text, text.split(","))
     except (ValueError, typer.BadParameter):
-        raise typer.BadParameter(f"{text!r} are not two numbers: give X,Y, such as 480,620") from None
-    return Pair(x, y)
+        raise typer.BadParameter(f"{text!r} {problem}") from None
+    return Pair(first, second)
 
 
 def number_from_text(text: str) -> float:

@@ -103,7 +103,7 @@ def slow_confirmed(maps, offsets, index):
 
 
 def test_maps_confirm_each_other_as_defined():
-    """Of six maps, several may look through a point that one confirms, and several may hide it."""
+    """Several of six maps may look through a point that one confirms, and several may hide it."""
     offsets = [ViewOffset(0.0, -2.0), ViewOffset(0.0, 0.0), ViewOffset(1.0, 2.0), *OFFSETS[:3]]
     maps = list(np.random.default_rng(1).uniform(-2, 2, (6, 20, 26)).astype(np.float32))
     for index in range(6):
