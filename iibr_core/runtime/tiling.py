@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from itertools import islice
 from typing import TypeVar
 
@@ -18,6 +18,8 @@ from iibr_core.types import ImageSize
 MAX_PIXELS_AT_ONCE = 1 << 17
 """Largest number of pixels in a band: a cancelled job stops within some 30 ms."""
 THREADS = core_count()
+_POOL = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-bands")
+"""Threads that help with the pieces of all jobs; they start when they are needed."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -31,18 +33,31 @@ def pieces_of(count: int, most: int) -> list[slice]:
 def in_pieces(work: Callable[[Item], Result], items: Sequence[Item], threads: int = 1) -> list[Result]:
     """Return the results of work on all items, in their order. threads: number of items side by side.
 
-    Raises Cancelled once the job is stopped, which is asked before every item.
+    The calling thread works, too, and waits only for pieces that have begun, so calls may be nested. Raises Cancelled
+    once the job is stopped, which is asked before every item.
     """
-
-    def piece(item: Item) -> Result:
-        raise_if_stopped()
-        return work(item)
-
     raise_if_stopped()
-    if min(threads, len(items)) <= 1:
-        return list(map(piece, items))
-    with ThreadPoolExecutor(min(threads, len(items)), thread_name_prefix="iibr-bands") as pool:
-        return list(pool.map(in_this_job(piece), items))
+    results: dict[int, Result] = {}
+    waiting = iter(range(len(items)))
+
+    def take_pieces() -> None:
+        try:
+            for number in waiting:
+                raise_if_stopped()
+                results[number] = work(items[number])
+        except BaseException:
+            deque(waiting, 0)  # no other thread begins a piece
+            raise
+
+    helpers = [_POOL.submit(in_this_job(take_pieces)) for _ in range(min(threads, len(items)) - 1)]
+    try:
+        take_pieces()
+    finally:
+        begun = [helper for helper in helpers if not helper.cancel()]
+        wait(begun)
+    for helper in begun:
+        helper.result()
+    return [results[number] for number in range(len(items))]
 
 
 def in_bands(

@@ -115,6 +115,13 @@ def test_results_come_in_order_and_errors_come_through(threads):
         in_pieces(lambda n: 1 // (n - 7), range(20), threads=threads)
 
 
+def test_pieces_may_have_pieces():
+    def row(n):
+        return sum(in_pieces(lambda m: n * m, range(50), threads=8))
+
+    assert in_pieces(row, range(50), threads=8) == [n * 1225 for n in range(50)]
+
+
 @pytest.mark.usefixtures("narrow")
 def test_views_under_way_end_with_those_who_take_them():
     began, ended = threading.Event(), []
