@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from imgui_bundle import portable_file_dialogs as dialogs
 
 from iibr_core.exports.kinds import export_kind
-from viewer.model.state.prompts import ChoiceOf, ExportPrompt, SavePrompt
+from iibr_core.exports.photo_folder import in_order, list_photos
+from viewer.model.state.prompts import ChoiceOf, ExportPrompt, Listing, SavePrompt
 
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first that it finds."""
@@ -71,6 +73,25 @@ def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:
     patterns = " ".join(f"*.{ending}" for ending in (*endings, *map(str.upper, endings)))
     filters = ["Models" if what == "model" else "Images", patterns, "All files", "*"]
     return Dialog(what, dialogs.open_file(title, start, filters))
+
+
+def list_folder(what: ChoiceOf, typed: str, path: str) -> Listing:
+    """Return the folders and the files to choose in a folder, in order, without hidden ones; none if it cannot be read.
+
+    typed: the folder as the user typed it. path: the same, absolute.
+    """
+    photos = in_order(list_photos(path), "name") if what in ("photo", "folder") else None
+    folders, files = [], []
+    with suppress(OSError), os.scandir(path) as entries:
+        for entry in entries:
+            if entry.name.startswith("."):
+                continue
+            if entry.is_dir():
+                folders.append(entry.name)
+            elif photos is None and entry.name.lower().endswith(tuple(f".{end}" for end in CHOICES[what][1].split())):
+                files.append(entry.name)
+    shown = files if photos is None else [photo.name for photo in photos]
+    return Listing(typed, path, tuple(sorted(folders, key=str.casefold)), tuple(shown))
 
 
 def ask_for_place(prompt: SavePrompt | ExportPrompt) -> Dialog:

@@ -41,6 +41,7 @@ from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.tasks import PlainTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
+from viewer.ui.overlays.path_prompt import browsed_paths
 from viewer.ui.overlays.welcome import recent_paths
 from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
@@ -114,7 +115,8 @@ class App:
         if pointer.step_x or pointer.step_y:
             self._pace.pointer_moved_at = time.perf_counter()
         actions = [do(gesture.end_gesture)] if pointer.is_pressed and self.state.history.gesture else []
-        thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout) + recent_paths(self.state))
+        paths = filmstrip_paths(self.state, layout) + recent_paths(self.state) + browsed_paths(self.state)
+        thumbnails = self._filmstrip.thumbnails(paths)
         sharp = self.sharpener.texture(picture) if picture else None
         texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
         woven = self.stereo_screen.texture

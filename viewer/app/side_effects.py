@@ -16,14 +16,14 @@ from iibr_core.exports.photo_folder import list_photos
 from iibr_core.formats.outputs import remove_leftovers
 from iibr_core.scenes.scene import source_beside
 from viewer.app.clipboard import paste_picture
-from viewer.app.dialogs import Dialog, ask_for_path, ask_for_place, has_dialogs
+from viewer.app.dialogs import Dialog, ask_for_path, ask_for_place, has_dialogs, list_folder
 from viewer.app.jobs import Jobs
 from viewer.app.picture_files import inputs_of_scene
 from viewer.app.saving import add_copy, add_export, add_save
 from viewer.background.depth_models import actions_of_download, download, list_models
 from viewer.background.newest import Newest, message_of
 from viewer.display.scene_view import SceneView
-from viewer.model import depth_models, folder, lens, messages, opening, stereo
+from viewer.model import browsing, depth_models, folder, lens, messages, opening, stereo
 from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
 from viewer.model.demo_photo import is_ours
@@ -33,7 +33,7 @@ from viewer.model.state import tasks
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import PhotoFacts
 from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import PathPrompt
+from viewer.model.state.prompts import ChoiceOf, PathPrompt
 
 
 class SideEffects:
@@ -85,11 +85,13 @@ class SideEffects:
     def _begin(self, task: tasks.Task, state: AppState) -> list[Action]:
         match task:
             case tasks.ChooseTask(what) if not has_dialogs():
-                return [do(messages.show_prompt, PathPrompt(what, _folder_beside(state)))]
+                return [do(browsing.edit_path, PathPrompt(what, _folder_beside(state)))]
             case tasks.ChooseTask(what):
                 self._dialog = self._dialog or ask_for_path(what, _folder_beside(state))
             case tasks.TakePathTask(prompt):
                 return _take_path(prompt, state)
+            case tasks.ListTask(prompt):
+                self._submit(partial(_list, prompt.what, prompt.folder, _absolute(prompt.folder, state)))
             case tasks.ChoosePlaceTask(prompt):
                 self._dialog = self._dialog or ask_for_place(prompt)
             case tasks.PlainTask("read mask", path):
@@ -167,11 +169,20 @@ def _take_path(prompt: PathPrompt, state: AppState) -> list[Action]:
     """Use a typed path; if nothing lies there, keep the prompt and state the problem."""
     path = prompt.path.strip()
     if path:
-        path = os.path.abspath(os.path.join(os.path.expanduser(_folder_beside(state)), os.path.expanduser(path)))
+        path = _absolute(path, state)
     if not os.path.exists(path):
         problem = f"There is no file or folder {path}." if path else "Type a path."
         return [do(messages.show_prompt, replace(prompt, problem=problem))]
     return [do(messages.show_prompt, None), action_for_path(prompt.what, path, state)]
+
+
+def _list(what: ChoiceOf, typed: str, path: str) -> Action:
+    return do(browsing.set_listing, list_folder(what, typed, path))
+
+
+def _absolute(typed: str, state: AppState) -> str:
+    """Return a typed path as an absolute one; it is relative to the folder of the open photo."""
+    return os.path.abspath(os.path.join(os.path.expanduser(_folder_beside(state)), os.path.expanduser(typed)))
 
 
 def _find_recent(state: AppState) -> Action:

@@ -35,8 +35,8 @@ def build_screen(
     woven_texture: int | None = None,
 ) -> list[Action]:
     """Build everything; return edits as actions. picture_texture: GL name of the picture, rows bottom-up. textures: of
-    inspection. thumbnails: of the filmstrip and of recent photos, by path. woven_texture: of a stereo picture that
-    fills the window instead.
+    inspection. thumbnails: of the filmstrip, of recent photos and of the prompt for a path, by path. woven_texture: of
+    a stereo picture that fills the window instead.
     """
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
@@ -57,7 +57,7 @@ def build_screen(
     if woven_texture is None:  # each eye sees half of a stereo picture: nothing lies over it unasked
         actions = filmstrip(state, layout, thumbnails) + chips(state, layout) + panel_handle(state, layout)
     actions += panel(state, layout) + welcome(state, layout, thumbnails)
-    return actions + notices(state, layout) + prompts(state, layout)
+    return actions + notices(state, layout) + prompts(state, layout, thumbnails)
 
 
 def _image(texture: int, corners: tuple[float, float, float, float]) -> None:

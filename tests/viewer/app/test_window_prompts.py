@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import Driver
+from viewer.app.main_loop import App
 from viewer.app.pace import NoticeClock
 from viewer.model import messages, preferences, saving
 from viewer.model.action import do
@@ -20,6 +21,7 @@ from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import RESULT_S, Notice
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, SavePrompt
+from viewer.ui.overlays.path_prompt import browsed_paths
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
@@ -159,7 +161,7 @@ def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path
     (tmp_path / "inner").mkdir()
     write_image(tmp_path / "inner" / "other.png", np.full((64, 96, 3), 100, np.uint8))
     viewer.app.do(BY_NAME["Open a photo…"].action(viewer.app.state))
-    viewer.until(lambda app: app.state.prompt == PathPrompt("photo", f"{tmp_path}/"))
+    viewer.until(lambda app: typed_path(app) == f"{tmp_path}/")
     viewer.until_idle()
     viewer.type(str(tmp_path / "inner" / "othr.png"))
     viewer.send("key", "Return")
@@ -173,6 +175,36 @@ def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path
     viewer.press("##path", "prompt PathPrompt")
     viewer.type(str(tmp_path / "inner" / "other.png"))
     viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
+    assert viewer.app.state.prompt is None
+
+
+def typed_path(app: App) -> str | None:
+    return app.state.prompt.path if isinstance(app.state.prompt, PathPrompt) else None
+
+
+def cells(viewer: Driver) -> str:
+    """The name of the part of the prompt that shows what a folder holds."""
+    viewer.until(lambda app: bool(browsed_paths(app.state)))
+    viewer.until_idle()
+    prompt = imgui.internal.find_window_by_name("prompt PathPrompt")
+    return f"prompt PathPrompt/entries_{prompt.get_id('entries'):08X}"
+
+
+def test_a_folder_is_walked_through_by_clicks_and_tab_completes_names(viewer: Driver, tmp_path: Path) -> None:
+    (tmp_path / "Inner" / "deep").mkdir(parents=True)
+    for name in ("deep/one.png", "other.png"):
+        write_image(tmp_path / "Inner" / name, np.full((64, 96, 3), 100, np.uint8))
+    viewer.app.do(BY_NAME["Open a photo…"].action(viewer.app.state))
+    viewer.press("photo Inner/", cells(viewer))
+    viewer.press("photo deep/", cells(viewer))
+    viewer.until(lambda app: set(browsed_paths(app.state)) == {str(tmp_path / "Inner" / "deep" / "one.png")})
+    viewer.press("photo ..", cells(viewer))
+    viewer.press("##path", "prompt PathPrompt")
+    viewer.type(f"{tmp_path}/in")
+    viewer.send("key", "Tab")
+    viewer.until(lambda app: typed_path(app) == f"{tmp_path}/Inner/")
+    viewer.press("photo other.png", cells(viewer))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
     assert viewer.app.state.prompt is None
 

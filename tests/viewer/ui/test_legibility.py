@@ -26,7 +26,7 @@ from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.state.preferences import SECTIONS, Theme, Units
-from viewer.model.state.prompts import ExportPrompt, JobProgress, PalettePrompt, PathPrompt, Prompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, JobProgress, Listing, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, Look, apply_style, palette_of
 
 WINDOW, SMALL_WINDOW = ScreenSize(1280, 800), ScreenSize(400, 300)
@@ -114,7 +114,7 @@ PROMPTS: dict[str, Prompt] = {
     "quit while busy": "quit",
     "palette": PalettePrompt(),
     "save": SavePrompt("a.jpg", ScreenSize(48, 32), problem="There is no such folder: choose another one, or make it."),
-    "path": PathPrompt("photo"),
+    "path": PathPrompt("photo", "/p/", listing=Listing("/p/", "/p", ("one with a long name that is cut",), ("a.jpg",))),
     "export": ExportPrompt("mp4", "a.mp4"),
     "models": ModelsPrompt(),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Literal
 
@@ -46,12 +47,32 @@ class ExportPrompt:
 
 
 @dataclass(frozen=True)
+class Listing:
+    """What a folder holds, as far as it can be opened. typed: the folder as it was typed; path: the same, absolute."""
+
+    typed: str
+    path: str
+    folders: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class PathPrompt:
-    """The prompt for the path of a file or folder, on systems without a file dialog."""
+    """The prompt for the path of a file or folder, on systems without a file dialog.
+
+    listing: of the folder of `path`, None until it is read. top: first row of the listing that is seen.
+    """
 
     what: ChoiceOf
     path: str = ""
     problem: str = ""
+    listing: Listing | None = None
+    top: int = 0
+
+    @property
+    def folder(self) -> str:
+        """The folder of the typed path, with a separator at its end; "" if none was typed."""
+        return self.path[: max(map(self.path.rfind, (os.sep, "/"))) + 1]
 
 
 @dataclass(frozen=True)

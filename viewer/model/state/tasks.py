@@ -42,6 +42,13 @@ class TakePathTask:
 
 
 @dataclass(frozen=True)
+class ListTask:
+    """List the folder of the path that was typed so far."""
+
+    prompt: PathPrompt
+
+
+@dataclass(frozen=True)
 class ChoosePlaceTask:
     """Let the user choose, in a dialog, the place that a prompt asks for."""
 
@@ -87,6 +94,6 @@ class FocusTask:
 
 
 Task = (
-    PlainTask | ChooseTask | TakePathTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask | ShowFileTask
-    | FocusTask
+    PlainTask | ChooseTask | TakePathTask | ListTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask
+    | ShowFileTask | FocusTask
 )  # fmt: skip

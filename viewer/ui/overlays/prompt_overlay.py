@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from imgui_bundle import imgui
 
 from viewer.model import messages, saving
-from viewer.model.action import Action, ask, do
+from viewer.model.action import Action, do
 from viewer.model.commands import COMMANDS, Command, commands_matching, recent_commands
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelsPrompt
+from viewer.model.state.folder import Thumbnail
 from viewer.model.state.prompts import (
-    ChoiceOf,
     ExportPrompt,
     FinishedFile,
     JobProgress,
@@ -23,12 +23,13 @@ from viewer.model.state.prompts import (
     Prompt,
     SavePrompt,
 )
-from viewer.model.state.tasks import TakePathTask
 from viewer.ui.overlays import prompt_rows as rows
 from viewer.ui.overlays.about_prompt import about_prompt
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.notice_corner import build_rows, job_rows
+from viewer.ui.overlays.path_prompt import WIDTH as PATH_WIDTH
+from viewer.ui.overlays.path_prompt import path_prompt
 from viewer.ui.overlays.save_prompt import save_prompt
 from viewer.ui.widgets import button, gap, last_part, quiet, scale
 
@@ -52,18 +53,10 @@ MOUSE = (
     ("Ctrl+click with the depth brush", "Pick the depth that Level and Bucket give"),
     ("Esc", "Close what is open, put the brush away"),
 )
-PATH_WORDS: dict[ChoiceOf, str] = {
-    "photo": "Open a photo",
-    "folder": "Open a folder of photos or views",
-    "mask": "Open a picture as the shape of the aperture; white lets light through",
-    "map": "Open a depth map for this photo",
-    "model": "Open a depth model: an ONNX file, or a folder",
-    "model folder": "Open the folder of a depth model",
-}
 
 
-def prompts(state: AppState, layout: Layout) -> list[Action]:
-    """Draw the prompt, if there is one; return the actions of the user."""
+def prompts(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnail | None]) -> list[Action]:
+    """Draw the prompt, if there is one; return the actions of the user. thumbnails: see `browsed_paths`."""
     prompt = state.prompt
     if prompt is None:
         return []
@@ -72,7 +65,7 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     imgui.begin(f"prompt {type(prompt).__name__}", None, rows.PROMPT_FLAGS)
     # A text field takes Esc for itself; one Esc closes the prompt.
     is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
-    actions = _contents(prompt, state)
+    actions = _contents(prompt, state, thumbnails)
     imgui.end()
     imgui.pop_style_var()
     return [do(messages.show_prompt, None)] if is_left else actions
@@ -86,20 +79,21 @@ def _place(prompt: Prompt, layout: Layout) -> None:
         width = min(PANEL_WIDTH * scale(), window.width)
         imgui.set_next_window_size_constraints(imgui.ImVec2(width, window.height), imgui.ImVec2(width, window.height))
         return
-    width, top = min(PROMPT_WIDTH * scale(), window.width), PROMPT_TOP * window.height
+    usual = PATH_WIDTH if isinstance(prompt, PathPrompt) else PROMPT_WIDTH
+    width, top = min(usual * scale(), window.width), PROMPT_TOP * window.height
     room = min(max(layout.panel.x, width + 8 * scale()), window.width)
     imgui.set_next_window_pos(imgui.ImVec2(room / 2, top), 0, imgui.ImVec2(0.5, 0))
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, window.height - top))
 
 
-def _contents(prompt: Prompt, state: AppState) -> list[Action]:
+def _contents(prompt: Prompt, state: AppState, thumbnails: Mapping[str, Thumbnail | None]) -> list[Action]:
     match prompt:
         case SavePrompt():
             return save_prompt(prompt, state)
         case ExportPrompt():
             return export_prompt(prompt, state)
         case PathPrompt():
-            return _path(prompt, state)
+            return path_prompt(prompt, state, thumbnails)
         case ModelsPrompt():
             return models_prompt(prompt, state)
         case PalettePrompt():
@@ -113,19 +107,6 @@ def _contents(prompt: Prompt, state: AppState) -> list[Action]:
         case "help":
             keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
             return _help([*MOUSE, *keys])
-
-
-def _path(prompt: PathPrompt, state: AppState) -> list[Action]:
-    """Draw a field for the path of a file or folder."""
-    imgui.text(PATH_WORDS[prompt.what])
-    gap()
-    row = rows.place_row("Path", prompt.path, replace(state, has_dialogs=False), prompt.problem)
-    edited = prompt if row.path == prompt.path else replace(prompt, path=row.path, problem="")
-    rows.say_problem(edited.problem, state)
-    pressed, closed = rows.prompt_buttons("Open")
-    if pressed or row.entered:
-        return [do(messages.show_prompt, edited), do(ask, TakePathTask(edited))]
-    return rows.prompt_actions(closed, edited, prompt)
 
 
 def _files(state: AppState) -> list[Action]:

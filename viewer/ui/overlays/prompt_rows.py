@@ -53,9 +53,11 @@ class PlaceRow(NamedTuple):
     browses: bool
 
 
-def place_row(text: str, path: str, state: AppState, problem: str = "") -> PlaceRow:
+def place_row(
+    text: str, path: str, state: AppState, problem: str = "", complete: Callable[[str], str] | None = None
+) -> PlaceRow:
     """Draw a row for a path, which shows its end if it is long; with a button where the system has dialogs. The field
-    has the keys when the prompt or a problem appears.
+    has the keys when the prompt or a problem appears. complete: what Tab makes of the path.
     """
     style = imgui.get_style()
     width = imgui.calc_text_size(BROWSE).x + 2 * style.frame_padding.x + style.item_spacing.x
@@ -66,7 +68,7 @@ def place_row(text: str, path: str, state: AppState, problem: str = "") -> Place
     focus_on_appearing()
     label(text)
     imgui.set_next_item_width(-width if state.has_dialogs else -1)
-    new, is_entered = text_field("path", path, flags=imgui.InputTextFlags_.elide_left)
+    new, is_entered = text_field("path", path, flags=imgui.InputTextFlags_.elide_left, complete=complete)
     if not state.has_dialogs:
         return PlaceRow(new, is_entered, False)
     imgui.same_line()
@@ -139,9 +141,19 @@ def is_enter() -> bool:
     return bool(imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False))
 
 
-def text_field(name: str, text: str, hint: str = "", flags: int = 0) -> tuple[str, bool]:
-    """Draw a text field; return the text, and whether Enter was pressed in it."""
-    _, new = imgui.input_text_with_hint(f"##{name}", hint, text, flags)
+def text_field(
+    name: str, text: str, hint: str = "", flags: int = 0, complete: Callable[[str], str] | None = None
+) -> tuple[str, bool]:
+    """Draw a text field; return the text, and whether Enter was pressed in it. complete: what Tab makes of the text."""
+
+    def replace_text(data: imgui.InputTextCallbackData) -> int:
+        new = complete(str(data.buf)) if complete is not None else str(data.buf)
+        data.delete_chars(0, data.buf_text_len)
+        data.insert_chars(0, new)
+        return 0
+
+    flags |= imgui.InputTextFlags_.callback_completion if complete is not None else 0
+    _, new = imgui.input_text_with_hint(f"##{name}", hint, text, flags, replace_text if complete is not None else None)
     return new, bool(imgui.is_item_deactivated() and is_enter())
 
 
