@@ -1,7 +1,5 @@
 """The first and last moments of the program."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -9,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from tests.viewer.cli.conftest import Iibr, iibr, refusal_of
+from tests.viewer.cli.conftest import iibr, refusal_of
 
 __all__ = ["iibr"]
 ROOT = Path(__file__).parents[2]
 
 
-def in_shell(line: str) -> subprocess.CompletedProcess[str]:
+def in_shell(line):
     """Run a line in bash, in which "iibr" runs the program. Exit code: of the first program of a pipe."""
     script = f'iibr() {{ "{sys.executable}" -P -m viewer "$@"; }}; {line}; exit ${{PIPESTATUS[0]}}'
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.run(["bash", "-c", script], env=env, capture_output=True, text=True, timeout=120)
 
 
-def test_output_that_cannot_be_written_is_one_line_and_a_reader_that_ends_is_no_error() -> None:
+def test_output_that_cannot_be_written_is_one_line_and_a_reader_that_ends_is_no_error():
     assert "No space left" in refusal_of(in_shell("iibr --version > /dev/full"))
     assert in_shell("iibr models | head -0").stderr == ""
 
@@ -37,9 +35,7 @@ def test_output_that_cannot_be_written_is_one_line_and_a_reader_that_ends_is_no_
         ("export gone.png", False, False),
     ],
 )
-def test_an_error_is_shown_in_a_dialog_to_whoever_sees_no_terminal(
-    tmp_path: Path, words: str, has_stderr: bool, is_shown: bool
-) -> None:
+def test_an_error_is_shown_in_a_dialog_to_whoever_sees_no_terminal(tmp_path, words, has_stderr, is_shown):
     shown, dialog = tmp_path / "shown", tmp_path / "zenity"
     dialog.write_text(f'#!/bin/sh\nprintf "%s\\n" "$@" >> {shown}\n')
     dialog.chmod(0o755)
@@ -64,10 +60,8 @@ def test_an_error_is_shown_in_a_dialog_to_whoever_sees_no_terminal(
     ],
     ids=repr,
 )
-def test_errors_are_one_line_and_unexpected_ones_are_logged(
-    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, failure: BaseException, code: int, message: str
-) -> None:
-    def load_photo(*_: object) -> None:
+def test_errors_are_one_line_and_unexpected_ones_are_logged(iibr, monkeypatch, tmp_path, failure, code, message):
+    def load_photo(*_):
         raise failure
 
     monkeypatch.setattr("iibr_core.scenes.photo.load_photo", load_photo)

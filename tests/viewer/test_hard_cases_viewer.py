@@ -3,13 +3,9 @@
 See also test_preferences_store.py, gpu/test_light_field_texture.py and gpu/test_context.py.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,13 +29,13 @@ GRID = GridShape(3, 3)
 
 
 @pytest.fixture
-def desk() -> Iterator[Desk]:
+def desk():
     made = Desk()
     yield made
     made.thread.close()
 
 
-def failure(desk: Desk, request: SceneRequest) -> str:
+def failure(desk, request):
     """What the worker says of a job that must fail; then it carries out another."""
     desk.thread.submit(request)
     while not isinstance(result := desk.next(), Failed):
@@ -48,7 +44,7 @@ def failure(desk: Desk, request: SceneRequest) -> str:
     return result.message
 
 
-def goes_on(desk: Desk, folder: Path, generation: int) -> None:
+def goes_on(desk, folder, generation):
     """The worker makes a whole field of a good photo."""
     photo = write_scene(folder, "good")
     desk.thread.submit(SceneRequest(generation, Source(str(photo), grid=GridShape(1, 2))))
@@ -56,12 +52,10 @@ def goes_on(desk: Desk, folder: Path, generation: int) -> None:
         assert not isinstance(result, Failed)
 
 
-def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(
-    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(desk, tmp_path, monkeypatch):
     """An array that no machine has room for, in the midst of the views."""
 
-    def exhaust(request: SceneRequest, eye: Callable[[], ViewOffset]) -> Iterator[SceneReady | ViewReady]:
+    def exhaust(request, eye):
         for result in results_of(request, eye):
             yield result
             np.zeros(1 << 56, np.uint8)
@@ -76,7 +70,7 @@ def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(
     goes_on(desk, tmp_path, 2)
 
 
-def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) -> None:
+def test_a_view_deleted_while_the_light_field_opens(desk, tmp_path):
     """The views that were read stay; the one that is gone is named."""
     views = (ViewUpdate(*at, np.full((8, 9, 3), 90, np.uint8), None) for at in np.ndindex(3, 3))
     write_light_field(tmp_path / "field", "hci", GRID, views, 50.0, "field")
@@ -92,13 +86,13 @@ def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) 
 
 
 @pytest.fixture
-def viewer(tmp_path: Path) -> Iterator[OffscreenScene]:
+def viewer(tmp_path):
     with OffscreenScene("egl") as made:
         made.open(Source(str(write_scene(tmp_path)), grid=GRID))
         yield made
 
 
-def test_the_photo_may_go_once_it_is_open(viewer: OffscreenScene, tmp_path: Path) -> None:
+def test_the_photo_may_go_once_it_is_open(viewer, tmp_path):
     before = viewer.picture()
     (tmp_path / "scene.png").unlink()
     (tmp_path / "scene_disparity.npy").unlink()
@@ -108,7 +102,7 @@ def test_the_photo_may_go_once_it_is_open(viewer: OffscreenScene, tmp_path: Path
         viewer.open(Source(str(tmp_path / "scene.png")))
 
 
-def test_settings_that_are_no_text(tmp_path: Path) -> None:
+def test_settings_that_are_no_text(tmp_path):
     """Found by fuzzing: bytes that are no UTF-8 where the settings stand."""
     write_image(tmp_path / "a.exr", np.zeros((4, 4, 3), np.uint8), {"iibr:settings": "{some text}"})
     data = (tmp_path / "a.exr").read_bytes()
@@ -118,7 +112,7 @@ def test_settings_that_are_no_text(tmp_path: Path) -> None:
         read_settings(tmp_path / "a.exr")
 
 
-def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
+def test_a_refused_gl_context_is_one_line(tmp_path):
     """EGL without any driver."""
     photo, out = str(write_scene(tmp_path)), str(tmp_path / "o.png")
     command = [sys.executable, "-P", "-m", "viewer", "screenshot", photo, "--backend", "egl", "-o", out]

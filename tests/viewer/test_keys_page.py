@@ -1,11 +1,8 @@
 """The table of keys in docs/window.md, the help on F1 and the program agree."""
 
-from __future__ import annotations
-
 from itertools import takewhile
 from pathlib import Path
 
-import pytest
 from imgui_bundle import imgui
 
 from iibr_core.scenes.screen_size import ScreenSize
@@ -18,17 +15,17 @@ from viewer.ui.overlays.prompt_overlay import MOUSE
 PAGE = Path(__file__).parents[2] / "docs" / "window.md"
 
 
-def test_the_page_and_the_help_show_every_key_and_gesture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_and_the_help_show_every_key_and_gesture(tmp_path, monkeypatch):
     lines = PAGE.read_text("utf-8").splitlines()
     rows = takewhile(lambda line: line.startswith("|"), lines[lines.index("| in the window | |") + 2 :])
     cells = ", ".join(row.split(" | ")[0].removeprefix("| ") for row in rows).replace("\\\\", "\\")
     keys = {chord.words for command in COMMANDS for chord in command.chords} | {gesture for gesture, _ in MOUSE}
     assert {cell.strip() for cell in cells.split(", ")} == keys
 
-    shown: list[str] = []
+    shown = []
     build = imgui.text_wrapped
 
-    def note(words: str) -> None:
+    def note(words):
         shown.append(words)
         build(words)
 

@@ -1,7 +1,5 @@
 """An installation that brings its kernels along compiles nothing for the commands that people use first."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -34,11 +32,11 @@ for command in sys.argv[1:]:
 """
 
 
-def kernels_in(folder: Path) -> dict[str, int]:
+def kernels_in(folder):
     return {path.name: path.stat().st_mtime_ns for path in folder.rglob("*.nb?")}
 
 
-def test_the_first_runs_compile_nothing(tmp_path: Path) -> None:
+def test_the_first_runs_compile_nothing(tmp_path):
     """In one process, without the settings of Numba of this one."""
     write_scene(tmp_path)
     random = np.random.default_rng(0)

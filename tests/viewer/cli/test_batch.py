@@ -1,7 +1,5 @@
 """`iibr batch` with real processes: killed workers, Ctrl-C, and a Dask cluster on this machine."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os
@@ -10,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -20,14 +17,13 @@ import pytest
 from PIL import Image
 
 from iibr_core.exports import batch
-from tests.viewer.cli.conftest import Iibr
 from viewer.cli.messages import BETTER_DEPTH
 
 needs_process_groups = pytest.mark.skipif(os.name != "posix", reason="process groups")
 
 
 @pytest.fixture
-def archive(tmp_path: Path) -> Path:
+def archive(tmp_path):
     """A folder of many photos: a batch can be interrupted before its end."""
     folder = tmp_path / "photos"
     folder.mkdir()
@@ -37,33 +33,33 @@ def archive(tmp_path: Path) -> Path:
     return folder
 
 
-def command(archive: Path, *words: object) -> list[str]:
+def command(archive, *words):
     options = ("--to", "hci", "--grid", "3", "-o", archive.with_name("out"))
     return [sys.executable, "-P", "-m", "viewer", "batch", str(archive), *map(str, (*options, *words))]
 
 
-def start_batch(archive: Path, *words: object) -> subprocess.Popen[str]:
+def start_batch(archive, *words):
     """Start a batch in a process group of its own."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.Popen(command(archive, *words), text=True, start_new_session=True, **pipes)  # type: ignore[call-overload,no-any-return]
+    return subprocess.Popen(command(archive, *words), text=True, start_new_session=True, **pipes)
 
 
-def wait_until(run: subprocess.Popen[str], is_reached: Callable[[], object]) -> None:
+def wait_until(run, is_reached):
     while not is_reached():
         assert run.poll() is None, run.communicate()
         time.sleep(0.01)
 
 
-def exports_in(out: Path) -> list[Path]:
+def exports_in(out):
     return sorted(path for path in out.glob("*") if path.name.isdecimal())
 
 
-def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
+def workers_of(run):
     children = psutil.Process(run.pid).children()
     return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
 
 
-def test_an_archive_is_exported_once(iibr: Iibr, archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_archive_is_exported_once(iibr, archive, monkeypatch):
     """In threads: those below run in processes."""
     monkeypatch.setattr(batch, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
     for variable in ("IIBR_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONWARNINGS", "PYTHONSAFEPATH"):
@@ -87,7 +83,7 @@ def test_an_archive_is_exported_once(iibr: Iibr, archive: Path, monkeypatch: pyt
 
 
 @needs_process_groups
-def test_ctrl_c_ends_all_processes_with_one_line(archive: Path) -> None:
+def test_ctrl_c_ends_all_processes_with_one_line(archive):
     out = archive.with_name("out")
     for number in range(8, 60):  # so many that it is far from its end when it is interrupted
         shutil.copyfile(archive / "00.png", archive / f"{number:02}.png")
@@ -101,7 +97,7 @@ def test_ctrl_c_ends_all_processes_with_one_line(archive: Path) -> None:
     assert not list(out.glob(".*"))
 
 
-def test_a_killed_worker_costs_no_photo(archive: Path) -> None:
+def test_a_killed_worker_costs_no_photo(archive):
     out = archive.with_name("out")
     with start_batch(archive, "--workers", 2) as run:
         wait_until(run, lambda: len(exports_in(out)) > 2)
@@ -113,20 +109,20 @@ def test_a_killed_worker_costs_no_photo(archive: Path) -> None:
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+def cluster(tmp_path):
     """A Dask scheduler on a free port and two workers: the address, and the three processes."""
     pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"
     dask, pipes = [sys.executable, "-P", "-m", "dask"], {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     scheduler = [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file]
-    processes = [subprocess.Popen(scheduler, **pipes)]  # type: ignore[call-overload]
+    processes = [subprocess.Popen(scheduler, **pipes)]
     try:
         while not (file.is_file() and file.stat().st_size):
             assert processes[0].poll() is None
             time.sleep(0.01)
         address = json.loads(file.read_text())["address"]
         worker = [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-        processes += [subprocess.Popen(worker, **pipes) for _ in range(2)]  # type: ignore[call-overload]
+        processes += [subprocess.Popen(worker, **pipes) for _ in range(2)]
         yield address, processes
     finally:
         for process in processes:
@@ -135,9 +131,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
             process.wait()
 
 
-def test_a_dask_cluster_exports_all_photos_although_a_worker_is_killed_and_its_end_is_one_line(
-    archive: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
-) -> None:
+def test_a_dask_cluster_exports_all_photos_although_a_worker_is_killed_and_its_end_is_one_line(archive, cluster):
     address, (scheduler, worker, _) = cluster
     out = archive.with_name("out")
     with start_batch(archive, "--dask", address) as run:
@@ -170,9 +164,7 @@ def test_a_dask_cluster_exports_all_photos_although_a_worker_is_killed_and_its_e
         ("photos --to depth -o out --dask nonsense://127.0.0.1:1", "unknown address scheme"),
     ],
 )
-def test_wrong_input_is_one_error(
-    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, archive: Path, words: str, message: str
-) -> None:
+def test_wrong_input_is_one_error(iibr, monkeypatch, archive, words, message):
     monkeypatch.chdir(archive.parent)
     for variable in ("PYTHONWARNINGS", "PYTHONSAFEPATH"):
         monkeypatch.setenv(variable, os.environ.get(variable, ""))

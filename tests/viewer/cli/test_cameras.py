@@ -12,17 +12,17 @@ from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.poses import read_poses
 from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, offsets_of, view_of_wall
-from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+from tests.viewer.cli.conftest import output_of, refusal_of
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """The working folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def write_wall(folder: Path, disparity: float) -> Path:
+def write_wall(folder, disparity):
     """Write 3x3 views of a wall with this disparity as an HCI folder with a map."""
     for k, offset in enumerate(offsets_of(3, 3).values()):
         write_image(folder / f"input_Cam{k:03d}.png", view_of_wall(offset, disparity))
@@ -31,7 +31,7 @@ def write_wall(folder: Path, disparity: float) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["llff", "nerfstudio", "colmap"])
-def test_views_that_converge_are_cropped_around_their_principal_points(iibr: Iibr, folder: Path, kind: str) -> None:
+def test_views_that_converge_are_cropped_around_their_principal_points(iibr, folder, kind):
     """A wall at -1.4, infinity at -3: its views as seen by cameras that look straight ahead."""
     (folder / "wall").mkdir()
     done = iibr("export", write_wall(folder / "wall", -1.4), "--to", kind, "-o", "out")
@@ -60,7 +60,7 @@ def test_views_that_converge_are_cropped_around_their_principal_points(iibr: Iib
     assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.08), "it opens again as a light field"
 
 
-def test_rows_closer_than_columns_stay_so(iibr: Iibr, folder: Path) -> None:
+def test_rows_closer_than_columns_stay_so(iibr, folder):
     """A folder with cameras, exported again: rows 0.4 times as far apart."""
     (folder / "in" / "images").mkdir(parents=True)
     offsets = {f"{9 - k}.png": ViewOffset(0.4 * t, s) for k, (t, s) in enumerate(offsets_of(3, 3).values())}
@@ -78,7 +78,7 @@ def test_rows_closer_than_columns_stay_so(iibr: Iibr, folder: Path) -> None:
     assert {camera.centre_px for camera in cameras} == {(23.5, 19.5)}
 
 
-def test_principal_points_that_move_far_are_stated_or_refused(iibr: Iibr, folder: Path) -> None:
+def test_principal_points_that_move_far_are_stated_or_refused(iibr, folder):
     (folder / "wall").mkdir()
     write_wall(folder / "wall", -8.4)
     assert "export cameras for nerfstudio or COLMAP" in refusal_of(iibr("export", "wall", "--to", "llff", "-o", "out"))
@@ -90,7 +90,7 @@ def test_principal_points_that_move_far_are_stated_or_refused(iibr: Iibr, folder
     }
 
 
-def test_an_hci_folder_of_views_without_disparity_states_its_range(iibr: Iibr, folder: Path) -> None:
+def test_an_hci_folder_of_views_without_disparity_states_its_range(iibr, folder):
     (folder / "wall").mkdir()
     (write_wall(folder / "wall", -1.4) / "gt_disp_u01_v01.npy").unlink()
     output_of(iibr("export", "wall", "--to", "hci", "-o", "out"))
@@ -101,7 +101,7 @@ def test_an_hci_folder_of_views_without_disparity_states_its_range(iibr: Iibr, f
     assert scene.infinity_px < low
 
 
-def test_a_densified_field_states_the_same_distances(iibr: Iibr, folder: Path) -> None:
+def test_a_densified_field_states_the_same_distances(iibr, folder):
     """Twice as many steps, each half as long: a point at infinity moves half as far in each."""
     (folder / "wall").mkdir()
     output_of(iibr("export", write_wall(folder / "wall", -1.4), "--to", "hci", "-o", "given"))

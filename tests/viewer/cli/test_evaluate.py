@@ -1,7 +1,5 @@
 """`iibr evaluate`: reports, refusals in one line, nothing left behind."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -9,13 +7,13 @@ import numpy as np
 import pytest
 
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_grid, write_hci
-from tests.viewer.cli.conftest import Iibr, contents, output_of, refusal_of
+from tests.viewer.cli.conftest import contents, output_of, refusal_of
 
 REPORT = ["index.html", "report.json", "report.md"]
 
 
 @pytest.fixture
-def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def data(tmp_path, monkeypatch):
     """A folder of two scenes in the working folder."""
     monkeypatch.chdir(tmp_path)
     write_grid(tmp_path / "data" / "square")
@@ -23,7 +21,7 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "data"
 
 
-def test_all_scenes_of_a_folder_are_compared(iibr: Iibr, data: Path) -> None:
+def test_all_scenes_of_a_folder_are_compared(iibr, data):
     *lines, last = output_of(iibr("evaluate", "data", "-o", "report", "--views", 1, "--refine", "off")).splitlines()
     assert last == "report/index.html"
     assert [line.split(":")[0] for line in lines if ":" in line] == ["row", "square", "square"]
@@ -32,7 +30,7 @@ def test_all_scenes_of_a_folder_are_compared(iibr: Iibr, data: Path) -> None:
     assert "iibr evaluate data" in Path("report/report.md").read_text()
 
 
-def test_stages_are_left_out(iibr: Iibr, data: Path) -> None:
+def test_stages_are_left_out(iibr, data):
     words = ("evaluate", data / "row", "--views", 1, "--refine", "off", "-o")
     without = ("--without", "outpainting", "--without", "synthesise-patches", "--without", "split-mixed-pixels")
     output_of(iibr(*words, "0"))
@@ -43,7 +41,7 @@ def test_stages_are_left_out(iibr: Iibr, data: Path) -> None:
     assert "--without outpainting" in tables[1]
 
 
-def test_a_report_is_replaced_with_force_only(iibr: Iibr, data: Path) -> None:
+def test_a_report_is_replaced_with_force_only(iibr, data):
     Path("report").mkdir()
     Path("report/notes.txt").write_text("mine")
     words = ("evaluate", data / "row", "-o", "report", "--views", 1, "--refine", "off")
@@ -52,7 +50,7 @@ def test_a_report_is_replaced_with_force_only(iibr: Iibr, data: Path) -> None:
     assert sorted(path.name for path in Path("report").iterdir()) == sorted([*REPORT, "notes.txt"])
 
 
-def test_a_map_is_compared_at_two_scales(iibr: Iibr, data: Path) -> None:
+def test_a_map_is_compared_at_two_scales(iibr, data):
     np.save("flat.npy", np.zeros((HEIGHT, WIDTH), np.float32))
     out = output_of(iibr("evaluate", data / "row", "-o", "report", "--disparity", "flat.npy"))
     figures = {name: float(db) for db, name in re.findall(r"([\d.]+) dB  (.+)", out)}
@@ -76,7 +74,7 @@ def test_a_map_is_compared_at_two_scales(iibr: Iibr, data: Path) -> None:
         ("-o o", "DATASET"),
     ],
 )
-def test_bad_input_is_one_line_and_leaves_nothing(iibr: Iibr, data: Path, words: str, message: str) -> None:
+def test_bad_input_is_one_line_and_leaves_nothing(iibr, data, words, message):
     Path("empty").mkdir()
     Path("file").write_text("no map")
     (write_grid(Path("broken")) / "gt_disp_u01_v01.npy").unlink()

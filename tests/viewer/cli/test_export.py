@@ -1,7 +1,5 @@
 """`iibr export`, as a person runs it: files, messages, refusals. Gloss, too."""
 
-from __future__ import annotations
-
 from configparser import ConfigParser
 from pathlib import Path
 
@@ -13,33 +11,33 @@ from PIL import Image
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import DISPLAY_P3, SRGB
-from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+from tests.viewer.cli.conftest import output_of, refusal_of
 
 GLOSS = "roughness = 0.5\nreflectance = 0.5\n[light]\ndirection = [0, 0, -1]\n"
 
 
 @pytest.fixture
-def photo(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def photo(photo_path, monkeypatch):
     """A photo in the working folder, with a gloss."""
     monkeypatch.chdir(photo_path.parent)
     Path("gloss.toml").write_text(GLOSS)
     return photo_path
 
 
-def views_of(folder: str) -> np.ndarray:
+def views_of(folder):
     return np.stack([np.asarray(Image.open(path)) for path in sorted(Path(folder).glob("input_Cam*.png"))]).astype(int)
 
 
-def test_a_drawn_kind(iibr: Iibr, photo: Path) -> None:
+def test_a_drawn_kind(iibr, photo):
     words = ("--to", "gif", "-o", "a.gif", "--grid", 3, "--frames", 6, "--motion", "swing", "--size", "30x20")
     done = iibr("export", photo, *words, "--rate", 100)
     assert output_of(done) == "a.gif\n"
     assert "animations of 100 frames a second; the same 0.06 s have 3 frames instead" in done.stderr
     with Image.open("a.gif") as image:
-        assert (image.size, image.n_frames) == ((30, 20), 3)  # type: ignore[attr-defined]
+        assert (image.size, image.n_frames) == ((30, 20), 3)
 
 
-def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr: Iibr, photo: Path) -> None:
+def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr, photo):
     words = ("export", photo, "-o", "a.html", "--for", "headset", "--to")
     for grid, views in (((), 45), (("--grid", 3), 9)):
         assert f"note: {views} views of 96x64 px" in iibr(*words, "web", *grid, "--force").stderr
@@ -48,7 +46,7 @@ def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr: Iibr, ph
 
 
 @pytest.mark.parametrize("shrink", [1, 2], ids=["a map of the photo's size", "a map of half its size"])
-def test_distances_of_a_map_in_metres_come_out_of_a_field(iibr: Iibr, photo: Path, shrink: int) -> None:
+def test_distances_of_a_map_in_metres_come_out_of_a_field(iibr, photo, shrink):
     """The benchmark's tools compute disparity as focal length * baseline * (1 / distance - 1 / focus distance)."""
     disparity = np.load("scene_disparity.npy")
     Path("scene_disparity.npy").unlink()
@@ -64,7 +62,7 @@ def test_distances_of_a_map_in_metres_come_out_of_a_field(iibr: Iibr, photo: Pat
     np.testing.assert_allclose(1 / nearness, metres, rtol=0.01)
 
 
-def test_the_name_with_its_tag_must_not_exist(iibr: Iibr, photo: Path) -> None:
+def test_the_name_with_its_tag_must_not_exist(iibr, photo):
     words = ("export", photo, "--to", "half-sbs", "-o", "a.png", "--grid", 3)
     assert output_of(iibr(*words)) == "a_LRF_Half_SBS.png\n"
     before = Path("a_LRF_Half_SBS.png").read_bytes()
@@ -73,7 +71,7 @@ def test_the_name_with_its_tag_must_not_exist(iibr: Iibr, photo: Path) -> None:
     assert not Path("a.png").exists()
 
 
-def test_a_light_field_of_disparity_as_given(iibr: Iibr, photo: Path) -> None:
+def test_a_light_field_of_disparity_as_given(iibr, photo):
     words = ("export", photo, "--to", "hci", "-o", "field", "--literal")
     assert "--grid" in refusal_of(iibr(*words))
     done = iibr(*words, "--grid", 5)
@@ -85,7 +83,7 @@ def test_a_light_field_of_disparity_as_given(iibr: Iibr, photo: Path) -> None:
         assert image.size == (5 * 96, 5 * 64)
 
 
-def test_disparity_is_found_for_a_light_field_without_it(iibr: Iibr, photo: Path) -> None:
+def test_disparity_is_found_for_a_light_field_without_it(iibr, photo):
     output_of(iibr("generate", photo, "--grid", 3, "--literal", "-o", "field"))
     given = read_pfm(Path("field/gt_disp_lowres.pfm"))
     for path in (*Path("field").glob("*.pfm"), Path("field/parameters.cfg")):
@@ -97,9 +95,7 @@ def test_disparity_is_found_for_a_light_field_without_it(iibr: Iibr, photo: Path
 
 
 @pytest.mark.parametrize("kind", ["cross-eyed", "focal-stack", "quilt"])
-def test_pictures_have_the_photos_colours_and_metadata(
-    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str
-) -> None:
+def test_pictures_have_the_photos_colours_and_metadata(iibr, monkeypatch, tmp_path, kind):
     """A Display P3 photo is exported in Display P3, unless displays ignore profiles; its GPS position never is."""
     monkeypatch.chdir(tmp_path)
     exif = Image.Exif()
@@ -121,7 +117,7 @@ def test_pictures_have_the_photos_colours_and_metadata(
     np.testing.assert_allclose(pixels[16, 4], (200, 80, 60) if is_wide else (216, 69, 50), atol=2.5)
 
 
-def test_gloss_is_the_same_in_all_outputs(iibr: Iibr, photo: Path) -> None:
+def test_gloss_is_the_same_in_all_outputs(iibr, photo):
     words = ("--grid", 3, "--gloss", "gloss.toml")
     output_of(iibr("generate", photo, "--grid", 3, "-o", "plain"))
     output_of(iibr("generate", photo, *words, "-o", "glossy"))
@@ -137,7 +133,7 @@ def test_gloss_is_the_same_in_all_outputs(iibr: Iibr, photo: Path) -> None:
     assert np.array_equal(np.asarray(Image.open("again.png")), drawn)
 
 
-def test_views_from_disk_take_gloss_if_their_disparity_is_negative(iibr: Iibr, photo: Path) -> None:
+def test_views_from_disk_take_gloss_if_their_disparity_is_negative(iibr, photo):
     output_of(iibr("generate", photo, "--grid", 3, "-o", "field", "--with-disparity"))
     output_of(iibr("screenshot", "field", "-o", "plain.png"))
     output_of(iibr("screenshot", "field", "--gloss", "gloss.toml", "-o", "glossy.png"))

@@ -1,7 +1,5 @@
 """A plain installation without any of the extras: what it does, and what it says about the rest."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -12,7 +10,7 @@ import pillow_heif
 import pytest
 from PIL import Image
 
-from tests.viewer.cli.conftest import Iibr, contents, output_of, refusal_of
+from tests.viewer.cli.conftest import contents, output_of, refusal_of
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = (
@@ -31,13 +29,13 @@ for sys.argv[1:] in {commands!r}:
 """
 
 
-def run_plain(*commands: list[str]) -> subprocess.CompletedProcess[str]:
+def run_plain(*commands):
     """Run `iibr` with these words, in a process of its own in which packages of extras cannot be imported."""
     command = [sys.executable, "-P", "-c", RUN.format(extras=EXTRAS, commands=commands)]
     return subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
 
 
-def test_heic_photos_are_viewed_and_become_loops_and_pages_without_an_extra(tmp_path: Path) -> None:
+def test_heic_photos_are_viewed_and_become_loops_and_pages_without_an_extra(tmp_path):
     photo, files = str(tmp_path / "photo.heic"), {kind: tmp_path / f"a.{kind}" for kind in ("png", "gif", "webp")}
     files["web"] = tmp_path / "a.html"
     pillow_heif.from_pillow(Image.radial_gradient("L").resize((96, 64)).convert("RGB")).save(photo)
@@ -60,9 +58,7 @@ def test_heic_photos_are_viewed_and_become_loops_and_pages_without_an_extra(tmp_
         ("plan scene.png --depth-model depth-pro", "pip install 'iibr[depth]'"),
     ],
 )
-def test_a_missing_package_is_named_in_one_line(
-    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, photo_path: Path, words: str, message: str
-) -> None:
+def test_a_missing_package_is_named_in_one_line(iibr, monkeypatch, photo_path, words, message):
     monkeypatch.chdir(photo_path.parent)
     monkeypatch.setattr("iibr_core.runtime.extras.find_spec", lambda name: None if name in EXTRAS else object())
     before = contents(Path())

@@ -1,26 +1,20 @@
 """`iibr models`, and messages about the origin of depth."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from iibr_core.depth.models.known import KNOWN_MODELS
 from tests.forked_iibr import run_forked
 from tests.iibr_core.depth.onnx_graphs import of_channels
-from tests.viewer.cli.conftest import Done, Iibr, output_of, refusal_of
+from tests.viewer.cli.conftest import output_of, refusal_of
 
 
-def run_models(home: Path, *words: object, typed: str = "") -> Done:
+def run_models(home, *words, typed=""):
     """Run a command in a process of its own, because the hub's library reads its address once; nobody listens there."""
     folders = dict.fromkeys(("HF_HOME", "XDG_CACHE_HOME", "XDG_DATA_HOME"), str(home))
     return run_forked(*words, cwd=home, typed=typed, HF_ENDPOINT="http://127.0.0.1:9", **folders)
 
 
-def test_models_are_listed_with_size_and_licence_and_a_file_of_ones_own_is_added(
-    photo_path: Path, tmp_path: Path
-) -> None:
+def test_models_are_listed_with_size_and_licence_and_a_file_of_ones_own_is_added(photo_path, tmp_path):
     file = of_channels(tmp_path / "metres.onnx", farness=True)
     copied = output_of(run_models(tmp_path, "models", "get", file)).splitlines()
     assert copied[-1] == "Use it: iibr view PHOTO --depth-model metres"
@@ -34,7 +28,7 @@ def test_models_are_listed_with_size_and_licence_and_a_file_of_ones_own_is_added
     output_of(run_models(tmp_path, "depth", photo_path, "--depth-model", "metres", "-o", "map.npy"))
 
 
-def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
+def test_without_a_network_get_is_one_line(tmp_path):
     done = run_models(tmp_path, "models", "get", "depth-anything-v2-small", "--yes")
     about, error = done.stderr.splitlines()
     assert done.returncode == 2
@@ -45,19 +39,19 @@ def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("typed", "code", "message"), [("\n", 1, "Nothing was downloaded"), ("", 130, "interrupted")])
-def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path: Path, typed: str, code: int, message: str) -> None:
+def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path, typed, code, message):
     done = run_models(tmp_path, "models", "get", "depth-anything-v2-small", typed=typed)
     assert done.returncode == code
     assert message in done.stderr
     assert "cannot be downloaded" not in done.stderr
 
 
-def test_an_unknown_model_is_one_line_with_those_known(iibr: Iibr) -> None:
+def test_an_unknown_model_is_one_line_with_those_known(iibr):
     line = refusal_of(iibr("models", "get", "depth-nothing"))
     assert all(model.name in line for model in KNOWN_MODELS)
 
 
-def test_commands_name_the_origin_of_depth_and_refuse_a_bad_model(iibr: Iibr, photo_path: Path, tmp_path: Path) -> None:
+def test_commands_name_the_origin_of_depth_and_refuse_a_bad_model(iibr, photo_path, tmp_path):
     words = ("generate", photo_path, "--grid", 1, "-o")
     assert "note: Depth: scene_disparity.npy." in iibr(*words, tmp_path / "a").stderr
     (model := tmp_path / "model").mkdir()

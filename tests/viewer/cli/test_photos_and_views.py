@@ -1,7 +1,5 @@
 """Unusual photos, files of several views, models and poses, opened by the commands that take them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -17,7 +15,7 @@ from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import ViewOffset
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square
-from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+from tests.viewer.cli.conftest import output_of, refusal_of
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH
 
 SQUARE, BACK, FLOOR = np.s_[20:44, 36:60], np.s_[2:10, 2:90], np.s_[56:, :]
@@ -25,7 +23,7 @@ SQUARE, BACK, FLOOR = np.s_[20:44, 36:60], np.s_[2:10, 2:90], np.s_[56:, :]
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """The working folder, without depth models on this machine."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
@@ -33,9 +31,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("reduced_for", ["nothing", "time", "memory"])
-def test_depth_of_a_pair_is_the_left_views(
-    iibr: Iibr, folder: Path, monkeypatch: pytest.MonkeyPatch, reduced_for: str
-) -> None:
+def test_depth_of_a_pair_is_the_left_views(iibr, folder, monkeypatch, reduced_for):
     """Where it is found from smaller copies, it is enlarged again, and its values with it."""
     times = {"nothing": 1, "time": 2, "memory": 5}[reduced_for]
     eyes = [np.rint(view_of_square(ViewOffset(0, s)) * 255).astype(np.uint8) for s in (0.0, 2.0)]
@@ -60,9 +56,7 @@ def test_depth_of_a_pair_is_the_left_views(
         (["--depth-model", "red.onnx", "--metric"], False),
     ],
 )
-def test_a_photo_without_depth_gets_a_guess_or_a_models(
-    iibr: Iibr, folder: Path, options: list[str], is_nearer_below: bool
-) -> None:
+def test_a_photo_without_depth_gets_a_guess_or_a_models(iibr, folder, options, is_nearer_below):
     """The photo is redder further down."""
     write_image(Path("photo.png"), np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
     of_channels(Path("red.onnx"))
@@ -72,7 +66,7 @@ def test_a_photo_without_depth_gets_a_guess_or_a_models(
     assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
 
 
-def write_map(photo: Path, kind: str) -> None:
+def write_map(photo, kind):
     """Write a map of this kind beside the photo; a depth in metres is 1 / (a + b * disparity)."""
     given = photo.with_name("scene_disparity.npy")
     disparity = uniform_filter(np.load(given), 5)  # so that its edges are refined
@@ -88,14 +82,12 @@ def write_map(photo: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["disparity", "depth", "depth picture"])
-def test_python_and_commands_give_the_same_numbers(iibr: Iibr, photo_path: Path, folder: Path, kind: str) -> None:
+def test_python_and_commands_give_the_same_numbers(iibr, photo_path, folder, kind):
     write_map(photo_path, kind)
     field = iibr_core.open(photo_path).light_field(3)
     output_of(iibr("generate", photo_path, "--grid", 3, "-o", "field", "--with-disparity"))
     written = iibr_core.open("field").light_field()
     np.testing.assert_array_equal(written.views, field.views)
-    assert written.disparity is not None
-    assert field.disparity is not None
     np.testing.assert_array_equal(written.disparity, field.disparity)
     near, far = (np.median(field.disparity[1, 1][part]) for part in (SQUARE, BACK))
     assert near > far + 0.5, "what is near moves most"
@@ -107,7 +99,7 @@ def test_python_and_commands_give_the_same_numbers(iibr: Iibr, photo_path: Path,
 
 
 @pytest.mark.parametrize("is_metric", [False, True])
-def test_a_models_depth_is_the_same_in_python(iibr: Iibr, photo_path: Path, folder: Path, is_metric: bool) -> None:
+def test_a_models_depth_is_the_same_in_python(iibr, photo_path, folder, is_metric):
     """The model gives the redness of a pixel: nearness, or a distance."""
     red = np.full((64, 96, 3), 60, np.uint8)
     red[SQUARE] = (220, 60, 60)
@@ -122,11 +114,11 @@ def test_a_models_depth_is_the_same_in_python(iibr: Iibr, photo_path: Path, fold
     assert square / wall == pytest.approx(60 / 220 if is_metric else 220 / 60, rel=0.05)
 
 
-def pixels_of(path: Path) -> np.ndarray:
+def pixels_of(path):
     return read_photo(path, 10**9).pixels
 
 
-def write_poses(*places: tuple[float, float, float]) -> str:
+def write_poses(*places):
     """Write transforms.json with cameras that look ahead: y up, z backwards."""
     matrices = [np.block([[np.eye(3), np.array(place)[:, None]], [0, 0, 0, 1]]) for place in places]
     frames = [{"transform_matrix": matrix.tolist()} for matrix in matrices]
@@ -135,7 +127,7 @@ def write_poses(*places: tuple[float, float, float]) -> str:
 
 
 @pytest.mark.parametrize("kind", ["nerfstudio", "llff", "colmap"])
-def test_the_cameras_of_a_light_field_see_its_views(iibr: Iibr, photo_path: Path, folder: Path, kind: str) -> None:
+def test_the_cameras_of_a_light_field_see_its_views(iibr, photo_path, folder, kind):
     output_of(iibr("export", photo_path, "--to", kind, "--grid", "3", "-o", "field"))
     output_of(iibr("generate", photo_path, "--poses", "field", "-o", "new"))
     views, known = sorted(Path("new").iterdir()), sorted(Path("field/images").iterdir())
@@ -144,7 +136,7 @@ def test_the_cameras_of_a_light_field_see_its_views(iibr: Iibr, photo_path: Path
         assert np.sqrt(np.mean((pixels_of(view) - pixels_of(other)) ** 2)) < 0.02
 
 
-def test_a_step_forward_makes_the_photo_larger(iibr: Iibr, photo_path: Path, folder: Path) -> None:
+def test_a_step_forward_makes_the_photo_larger(iibr, photo_path, folder):
     poses = write_poses((0, 0, 0), (0, 0, -0.25))
     output_of(iibr("generate", photo_path, "--poses", poses, "--photo-pose", "1", "-o", "new"))
     still, forward = (pixels_of(path) for path in sorted(Path("new").iterdir()))
@@ -153,7 +145,7 @@ def test_a_step_forward_makes_the_photo_larger(iibr: Iibr, photo_path: Path, fol
     assert red[1] / red[0] == pytest.approx(1 / 0.75**2, rel=0.1)
 
 
-def test_poses_that_show_mostly_inpainted_areas_are_named(iibr: Iibr, photo_path: Path, folder: Path) -> None:
+def test_poses_that_show_mostly_inpainted_areas_are_named(iibr, photo_path, folder):
     words = ("generate", photo_path, "--poses", write_poses((0, 0, 0), (0, 0, 20)), "--photo-pose", "1", "-o", "new")
     done = iibr(*words)
     output_of(done)

@@ -1,32 +1,29 @@
 """`iibr train`: short runs on real batches, how they end and continue, and their messages."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from iibr_core.formats.weights import read_weights
 from iibr_core.training import batches
-from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+from tests.viewer.cli.conftest import output_of, refusal_of
 
 WORDS = ("train", "--device", "cpu", "--seed", 3, "-o", "w.safetensors")
 WRITTEN = ["w.checkpoint.pt", "w.csv", "w.safetensors"]
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def names() -> list[str]:
+def names():
     return sorted(path.name for path in Path().iterdir())
 
 
-def test_steps_write_weights_with_their_command(iibr: Iibr) -> None:
+def test_steps_write_weights_with_their_command(iibr):
     size = output_of(iibr(*WORDS, "--steps", 3)).strip()
     assert size == f"w.safetensors: {Path('w.safetensors').stat().st_size / 1000:.1f} kB after 3 steps"
     assert names() == WRITTEN
@@ -34,8 +31,8 @@ def test_steps_write_weights_with_their_command(iibr: Iibr) -> None:
     assert len(Path("w.csv").read_text().splitlines()) == 4
 
 
-def test_ctrl_c_saves_and_names_the_command_that_continues(iibr: Iibr, monkeypatch: pytest.MonkeyPatch) -> None:
-    def batch(step: int, seed: int) -> Any:
+def test_ctrl_c_saves_and_names_the_command_that_continues(iibr, monkeypatch):
+    def batch(step, seed):
         if step == 3:
             signal.raise_signal(signal.SIGINT)
         return real_batch(step, seed)
@@ -68,13 +65,13 @@ def test_ctrl_c_saves_and_names_the_command_that_continues(iibr: Iibr, monkeypat
         ("--resume", "w.checkpoint.pt"),
     ],
 )
-def test_bad_values_are_one_line_and_leave_nothing(iibr: Iibr, words: str, message: str) -> None:
+def test_bad_values_are_one_line_and_leave_nothing(iibr, words, message):
     assert message in refusal_of(iibr("train", "--steps", 2, "-o", "w.safetensors", *words.split()))
     assert names() == []
 
 
 @pytest.mark.parametrize("name", WRITTEN[1:])
-def test_existing_files_are_kept_without_force(iibr: Iibr, name: str) -> None:
+def test_existing_files_are_kept_without_force(iibr, name):
     """The log too, which may be somebody's table."""
     Path(name).write_text("mine")
     assert f"{name}: already exists; give --force" in refusal_of(iibr(*WORDS, "--steps", 1))

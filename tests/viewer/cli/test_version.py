@@ -1,23 +1,19 @@
 """`iibr --version`."""
 
-from __future__ import annotations
-
 import platform
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
-import pytest
-
-from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+from tests.viewer.cli.conftest import output_of, refusal_of
 from viewer.gpu import context
 from viewer.model import version
 
 ROOT = Path(__file__).parents[3]
 
 
-def test_the_version_names_commit_gl_and_python(iibr: Iibr) -> None:
+def test_the_version_names_commit_gl_and_python(iibr):
     program, commit, gl, python = output_of(iibr("--version")).splitlines()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     assert program == f"iibr {project['version']}"
@@ -28,9 +24,7 @@ def test_the_version_names_commit_gl_and_python(iibr: Iibr) -> None:
     assert python == f"Python {platform.python_version()}"
 
 
-def test_without_the_libraries_of_a_desktop_each_command_says_why(
-    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, photo_path: Path
-) -> None:
+def test_without_the_libraries_of_a_desktop_each_command_says_why(iibr, monkeypatch, photo_path):
     monkeypatch.setattr(context, "usual_backends", lambda platform: ("osmesa",))
     monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     (line,) = [line for line in output_of(iibr("--version")).splitlines() if line.startswith("OpenGL")]
@@ -38,7 +32,7 @@ def test_without_the_libraries_of_a_desktop_each_command_says_why(
     assert "no window can be opened (import of imgui_bundle" in refusal_of(iibr("view", photo_path))
 
 
-def test_the_commit_comes_from_the_packaged_file_or_from_git(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_commit_comes_from_the_packaged_file_or_from_git(monkeypatch, tmp_path):
     package = tmp_path / "viewer"
     package.mkdir()
     commit = version.program_commit.__wrapped__  # asked anew each time

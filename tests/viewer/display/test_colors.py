@@ -1,7 +1,5 @@
 """Colours that sRGB lacks, from a photo's file to the screen: only the last step cuts them off."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from io import BytesIO
 

@@ -1,31 +1,26 @@
 """The filmstrip's pictures are read in the background; one that cannot be read does not hold up the others."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from threading import Event
 
 import numpy as np
 from PIL import Image
 
 from viewer.display.filmstrip_view import FilmstripView
-from viewer.gpu.context import GLContext, create_headless
-from viewer.model.state.folder import Thumbnail
+from viewer.gpu.context import create_headless
 
 RED, GREEN = (200, 30, 20), (20, 180, 40)
 """Colours of the upper and the lower half of the pictures."""
 
 
-def colours_of(gl: GLContext, thumbnail: Thumbnail | None) -> list[tuple[int, ...]]:
+def colours_of(gl, thumbnail):
     """Return the colours of a thumbnail of 30x20 pixels in its first and last row."""
-    assert thumbnail is not None
     assert thumbnail.aspect == 1.5
     texture = gl.ctx.external_texture(thumbnail.texture, (30, 20), 3, 0, "f1")
     pixels = np.frombuffer(texture.read(alignment=1), np.uint8).reshape(20, 30, 3)
     return [tuple(row[15].tolist()) for row in pixels[[0, -1]]]
 
 
-def test_an_unexpected_error_costs_one_thumbnail_and_a_light_field_shows_a_view(tmp_path: Path) -> None:
+def test_an_unexpected_error_costs_one_thumbnail_and_a_light_field_shows_a_view(tmp_path):
     for name in ("good.png", "field/1.png", "field/2.png"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         halves = (RED, GREEN) if name == "good.png" else (GREEN, RED)

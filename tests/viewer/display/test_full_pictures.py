@@ -1,10 +1,6 @@
 """Pictures at the photo's own size against the same pictures from views as large as the photo."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +11,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, GridShape, ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 from viewer.display.offscreen import OffscreenScene
 
 SIZE = ScreenSize(300, 200)
@@ -37,7 +33,7 @@ LENSES = {
 
 
 @pytest.fixture(scope="module")
-def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def photo(tmp_path_factory):
     """A textured disc before a slanted wall, with a bright dot."""
     folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(2)
     noise = np.stack([gaussian_filter(random.random(SIZE[::-1]), 1.5) for _ in range(3)], axis=-1)
@@ -53,7 +49,7 @@ def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def viewers(photo: Path) -> Iterator[tuple[OffscreenScene, OffscreenScene]]:
+def viewers(photo):
     """The photo opened smaller, and at its own size."""
     with OffscreenScene("egl") as smaller, OffscreenScene("egl") as own:
         for viewer, max_pixels in ((smaller, SMALLER), (own, 10**6)):
@@ -61,25 +57,21 @@ def viewers(photo: Path) -> Iterator[tuple[OffscreenScene, OffscreenScene]]:
         yield smaller, own
 
 
-def picture(viewer: OffscreenScene, optics: Optics) -> FloatImage:
+def picture(viewer, optics):
     greatest = max(map(abs, viewer.scene.disparity_range_px))
     viewer.state = replace(viewer.state, optics=optics.with_focus_scaled(greatest))
     return np.asarray(viewer.picture(SIZE), np.float32) / 255
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_a_picture_at_the_photos_own_size_is_that_of_views_so_large(
-    viewers: tuple[OffscreenScene, OffscreenScene], name: str
-) -> None:
+def test_a_picture_at_the_photos_own_size_is_that_of_views_so_large(viewers, name):
     optics = LENSES[name]
     full, expected = (picture(viewer, optics)[8:-8, 8:-8] for viewer in viewers)
     assert [viewer.draws_own_pixels(SIZE) for viewer in viewers] == [True, False]
     assert bounded_psnr(full, expected) > MIN_DB
 
 
-def test_tiles_are_as_sharp_as_the_whole(
-    viewers: tuple[OffscreenScene, OffscreenScene], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tiles_are_as_sharp_as_the_whole(viewers, monkeypatch):
     optics = LENSES["tilt"]
     at_once = picture(viewers[0], optics)
     monkeypatch.setattr("iibr_core.exports.full_drawing.TILE_PX", 64)

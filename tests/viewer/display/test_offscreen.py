@@ -1,35 +1,29 @@
 """The window's picture and panels without a window, under EGL."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import watched
-from iibr_core.scenes.scene import MAKING, Scene, Source
+from iibr_core.scenes.scene import MAKING, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.known_scenes import write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
-from viewer.model.action import Action, do
+from viewer.model.action import do
 from viewer.model.layout import layout_of
 
 
 @pytest.fixture
-def viewer(photo_path: Path) -> Iterator[OffscreenScene]:
+def viewer(photo_path):
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(photo_path), grid=GridShape(3, 3)))
         yield viewer
 
 
-def test_the_centre_view_is_the_photo_letterboxed_where_there_is_room(viewer: OffscreenScene, photo_path: Path) -> None:
+def test_the_centre_view_is_the_photo_letterboxed_where_there_is_room(viewer, photo_path):
     picture, wide = viewer.picture(), viewer.picture((WIDTH + 40, HEIGHT))
     assert picture.shape == (HEIGHT, WIDTH, 3)
     assert np.abs(picture / 255 - read_photo(photo_path).pixels).max() < 2.5 / 255
@@ -37,12 +31,11 @@ def test_the_centre_view_is_the_photo_letterboxed_where_there_is_room(viewer: Of
     assert (wide[:, :20] == wide[0, 0]).all()
 
 
-def test_panels_stand_beside_the_same_picture(viewer: OffscreenScene) -> None:
+def test_panels_stand_beside_the_same_picture(viewer):
     size = (1000, 700)
     viewer.do(do(lens.move_eye, ViewOffset(0.5, 1)), do(lens.set_aperture, 2))
     screen = viewer.screen(size)
     layout = layout_of(size, (WIDTH, HEIGHT))
-    assert layout.frame_px is not None
     x, y, width, height = layout.frame_px
     box = screen[y : y + height, x : x + width].astype(int)
     notices_are_below = height - 120  # the notice about the scene may lie over the lower edge
@@ -55,14 +48,14 @@ def test_panels_stand_beside_the_same_picture(viewer: OffscreenScene) -> None:
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((1, 1, 3)), np.full((7, 1, 3), 128)])
-def test_tiny_photos_open(tmp_path: Path, viewer: OffscreenScene, pixels: np.ndarray) -> None:
+def test_tiny_photos_open(tmp_path, viewer, pixels):
     write_image(tmp_path / "tiny.png", pixels.astype(np.uint8))
     viewer.open(Source(str(tmp_path / "tiny.png")))
     np.testing.assert_array_equal(viewer.picture(), pixels)
     assert viewer.screen((800, 600)).shape == (600, 800, 3)
 
 
-def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenScene) -> None:
+def test_light_fields_of_other_layouts_open(tmp_path, viewer):
     """Stanford's names, whose rows count upwards, and a stereo pair: what is seen are the views on disk."""
     stanford = write_stanford(tmp_path / "stanford", 3, 3)
     viewer.open(Source(str(stanford)))
@@ -70,7 +63,6 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenSce
         viewer.do(do(lens.move_eye, eye))
         assert np.abs(viewer.picture() / 255 - read_photo(stanford / f"{name}.png").pixels).max() < 1.5 / 255
     viewer.open(Source(str(write_stereo_pair(tmp_path / "pair"))))
-    assert viewer.state.scene is not None
     assert viewer.state.scene.grid == (1, 2)
     right = read_photo(tmp_path / "pair" / "im1.png").pixels
     assert np.abs(viewer.picture() / 255 - right).max() < 1.5 / 255
@@ -85,15 +77,13 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenSce
         ((do(lens.set_dolly, 0.3),), 24, 0),
     ],
 )
-def test_only_the_views_that_a_picture_shows_are_made(
-    viewer: OffscreenScene, photo_path: Path, actions: tuple[Action, ...], views: int, off: float
-) -> None:
+def test_only_the_views_that_a_picture_shows_are_made(viewer, photo_path, actions, views, off):
     """off: root mean square in 8-bit steps; what few views disocclude, or a lens blurs, is inpainted in fewer outer
     ones.
     """
     source, made = Source(str(photo_path), grid=GridShape(5, 5)), list[float]()
 
-    def pictures_of(scene: Scene) -> list[Optics]:
+    def pictures_of(scene):
         viewer.do(*actions)
         return [viewer.state.optics]
 

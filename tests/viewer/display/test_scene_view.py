@@ -1,14 +1,9 @@
 """What stands on the screen while views come: drawn a bit a frame, and never softer than it was."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.opening import results_of
@@ -18,10 +13,8 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import headless_with_scene, write_scene
 from viewer.display import scene_view
 from viewer.display.offscreen import OffscreenScene
-from viewer.display.scene_view import SceneView
 from viewer.model import lens, opening
-from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
+from viewer.model.action import do
 
 SIZE = ScreenSize(384, 256)
 WORSE_DB = 1.0
@@ -29,7 +22,7 @@ WORSE_DB = 1.0
 
 
 @pytest.fixture
-def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[OffscreenScene]:
+def opened(tmp_path, monkeypatch):
     """A picture that has got every pass; views are shown as soon as they come, and no frame has time for more than one
     sample.
     """
@@ -41,14 +34,13 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Offscree
         yield viewer
 
 
-def a_view_comes(view: SceneView) -> None:
+def a_view_comes(view):
     centre = view.centre
-    assert centre is not None
     view.add(replace(centre, row=0, column=1, colors=np.full_like(centre.colors, 255)))
     view.upload_all()
 
 
-def test_a_view_that_comes_costs_no_frame_all_passes(opened: OffscreenScene) -> None:
+def test_a_view_that_comes_costs_no_frame_all_passes(opened):
     view = opened.view
     opened.do(do(lens.move_eye, ViewOffset(-0.5, 0.3)))
     view.converge(opened.state, SIZE)
@@ -75,9 +67,7 @@ def test_a_view_that_comes_costs_no_frame_all_passes(opened: OffscreenScene) -> 
     ],
     ids=["one view", "between views", "a lens"],
 )
-def test_a_picture_that_is_one_view_is_not_drawn_for_others(
-    opened: OffscreenScene, edits: tuple[Action, ...], draws: bool
-) -> None:
+def test_a_picture_that_is_one_view_is_not_drawn_for_others(opened, edits, draws):
     view = opened.view
     opened.do(do(lens.set_aperture, 0.0), *edits)
     view.converge(opened.state, SIZE)
@@ -90,10 +80,9 @@ def test_a_picture_that_is_one_view_is_not_drawn_for_others(
     assert view.shows_all_views()
 
 
-def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: OffscreenScene) -> None:
+def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened):
     view, at = opened.view, (0, 1)
     view._is_final[at] = False
-    assert opened.state.scene is not None
     opened.do(do(lens.set_aperture, 0.0), do(lens.move_eye, opened.state.scene.grid.offset(*at)))
     view.converge(opened.state, SIZE)
     pictures = view.pictures_drawn
@@ -103,10 +92,8 @@ def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: OffscreenScene) 
     assert view.pictures_drawn == pictures + 1
 
 
-def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: OffscreenScene) -> None:
+def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened):
     view, scene = opened.view, opened.state.scene
-    assert scene is not None
-    assert view.centre is not None
     view.open(SceneReady(view.generation, scene, view.loaded, view.centre))
     view.show_fallback(replace(view.centre, colors=np.full_like(view.centre.colors, 255)))
     view.converge(opened.state, SIZE)
@@ -117,11 +104,11 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: O
     assert view.renderer.read_image().min() == 255
 
 
-def psnr_db(image: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
+def psnr_db(image, other):
     return float(10 * np.log10(255**2 / max(np.square(image.astype(float) - other).mean(), 1e-3)))
 
 
-def frames_of(view: SceneView, state: AppState, most: int) -> Iterator[NDArray[np.uint8]]:
+def frames_of(view, state, most):
     """Draw frames, at most that number; yield the picture on the screen after each."""
     for _ in range(most):
         view.draw(state, SIZE)
@@ -130,11 +117,9 @@ def frames_of(view: SceneView, state: AppState, most: int) -> Iterator[NDArray[n
 
 @pytest.mark.parametrize("frames_a_view", [3, 60], ids=["views come quickly", "views come slowly"])
 @pytest.mark.parametrize("edit", [do(lens.apply_preset, "macro"), do(lens.move_eye, ViewOffset(0.4, 0.7))])
-def test_a_still_picture_never_gets_worse_while_views_come(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, edit: Action, frames_a_view: int
-) -> None:
+def test_a_still_picture_never_gets_worse_while_views_come(tmp_path, monkeypatch, edit, frames_a_view):
     monkeypatch.setattr(scene_view, "VIEW_REFRESH_S", 0.0)
-    source, frames = Source(str(write_scene(tmp_path)), grid=GridShape(5, 5)), []
+    source, frames = Source(str(write_scene(tmp_path)), grid=GridShape(3, 3)), []
     with OffscreenScene("egl") as viewer:
         monkeypatch.setattr(type(viewer.gl), "frame_budget_s", 1e-9)
         viewer.do(do(opening.open_source, source))
@@ -157,13 +142,11 @@ def test_a_still_picture_never_gets_worse_while_views_come(
     assert quality[0] < quality[-1] - 3, "the first frame is a draft"
 
 
-def test_the_picture_of_a_photo_stays_until_that_of_its_next_scene_is_fine(opened: OffscreenScene) -> None:
+def test_the_picture_of_a_photo_stays_until_that_of_its_next_scene_is_fine(opened):
     view, scene = opened.view, opened.state.scene
     opened.do(do(lens.set_aperture, 0.0), do(lens.move_eye, ViewOffset(-0.5, 0.3)))
     view.converge(opened.state, SIZE)
     before = view.renderer.read_image()
-    assert scene is not None
-    assert view.centre is not None
     white = replace(view.centre, colors=np.full_like(view.centre.colors, 255))
     view.open(SceneReady(view.generation + 1, scene, view.loaded, white))
     shown = list(frames_of(view, opened.state, 40))

@@ -1,10 +1,5 @@
 """A light field whose rows stand 0.4 times as far apart as columns, compared with its scene."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -27,45 +22,45 @@ at most where rows were taken for as far apart as columns.
 """
 
 
-def through_lens(focus: float, aperture: float) -> np.ndarray:
+def through_lens(focus, aperture):
     """Return the mean, in linear light, of what cameras in a round disc see; its diameter counts columns."""
     places = np.linspace(-aperture / 2, aperture / 2, 13)
     inside = [(t, s) for t in places for s in places if np.hypot(t, s) <= aperture / 2]
     return srgb_from_linear(np.mean([linear_from_srgb(seen(t, s, focus)) for t, s in inside], axis=0))
 
 
-def psnr(one: np.ndarray, other: np.ndarray) -> float:
+def psnr(one, other):
     return float(-10 * np.log10(np.mean((one[SQUARE] - other[SQUARE]) ** 2)))
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     return write_unequal_rows(tmp_path_factory.mktemp("fields") / "field")
 
 
 @pytest.fixture(scope="module")
-def viewer(folder: Path) -> Iterator[OffscreenScene]:
+def viewer(folder):
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(folder)))
         yield viewer
 
 
-def show(viewer: OffscreenScene, eye: ViewOffset, focus: float, aperture: float) -> np.ndarray:
+def show(viewer, eye, focus, aperture):
     viewer.do(do(lens.move_eye, eye), do(lens.set_focus, focus), do(lens.set_aperture, aperture))
     return viewer.picture() / 255
 
 
 @pytest.mark.parametrize("eye", [ViewOffset(0.5, 0.0), ViewOffset(-1.5, 0.5)])
-def test_viewpoints_between_rows_show_the_scene(viewer: OffscreenScene, eye: ViewOffset) -> None:
+def test_viewpoints_between_rows_show_the_scene(viewer, eye):
     assert psnr(show(viewer, eye, 0.0, 0.0), seen(ROW_STEP * eye.t, eye.s)) >= MIN_VIEW_PSNR_DB
 
 
 @pytest.mark.parametrize("focus", [SQUARE_PX, WALL_PX])
-def test_wide_apertures_refocus_on_both_surfaces(viewer: OffscreenScene, focus: float) -> None:
+def test_wide_apertures_refocus_on_both_surfaces(viewer, focus):
     assert psnr(show(viewer, CENTRE, focus, 3.0), through_lens(focus, 3.0)) >= MIN_LENS_PSNR_DB
 
 
-def test_dolly_magnifies_alike_across_and_down(viewer: OffscreenScene) -> None:
+def test_dolly_magnifies_alike_across_and_down(viewer):
     viewer.do(do(lens.set_dolly, 1.5))
     moved = show(viewer, CENTRE, 0.0, 0.0)
     viewer.do(do(lens.set_dolly, 0.0))
@@ -73,14 +68,14 @@ def test_dolly_magnifies_alike_across_and_down(viewer: OffscreenScene) -> None:
     assert psnr(moved, seen(t, s)) >= MIN_VIEW_PSNR_DB
 
 
-def test_the_surface_under_the_pointer_is_picked(viewer: OffscreenScene) -> None:
+def test_the_surface_under_the_pointer_is_picked(viewer):
     viewer.do(do(lens.move_eye, ViewOffset(1.0, 0.0)))
     upper_edge = 28 - SQUARE_PX * ROW_STEP
     assert viewer.pick(48, upper_edge - 1.2) == pytest.approx(WALL_PX, abs=0.2)
     assert viewer.pick(48, upper_edge + 1.2) == pytest.approx(SQUARE_PX, abs=0.2)
 
 
-def test_python_refocuses_and_makes_views_between_rows(folder: Path) -> None:
+def test_python_refocuses_and_makes_views_between_rows(folder):
     field = iibr.open(folder)
     assert psnr(field.light_field().refocus(SQUARE_PX, 4.0), seen(0, 0)) >= MIN_LENS_PSNR_DB
     dense = field.light_field(grid=(9, 9))
@@ -89,7 +84,7 @@ def test_python_refocuses_and_makes_views_between_rows(folder: Path) -> None:
         assert psnr(dense.view(2 * s, 2 * t), seen(ROW_STEP * t, s)) >= MIN_VIEW_PSNR_DB
 
 
-def test_layouts_that_cannot_state_it_say_so(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_layouts_that_cannot_state_it_say_so(folder, tmp_path, capsys):
     note = "Rows stand 0.4 times as far apart as columns"
     app(["export", str(folder), "--to", "hci", "-o", str(tmp_path / "hci")], standalone_mode=False)
     assert note in capsys.readouterr().err

@@ -1,23 +1,16 @@
 """Light fields whose every view is known exactly: a textured background and a disc before it, each at one disparity."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_shape import opening
 from iibr_core.beyond.hidden_surfaces import SeenBehind, hidden_surface
-from iibr_core.beyond.optics import Optics
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.picture_renderer import Renderer
-
-Numbers = float | NDArray[np.float64]
+from iibr_core.types import ViewOffset
 
 
 @dataclass(frozen=True)
@@ -31,13 +24,13 @@ class TwoPlanes:
     radius_px: float = 18.0
     contrast: float = 0.2
 
-    def view(self, eye: ViewOffset) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    def view(self, eye):
         """Colours (H, W, 3) and disparity (H, W) seen from an eye, pixel centres only."""
         y, x = np.indices((self.height, self.width)).astype(float)
         colors, disparity = self.seen(x, y, eye.t, eye.s)
         return np.rint(colors * 255).astype(np.uint8), disparity
 
-    def seen(self, x: Numbers, y: Numbers, t: Numbers, s: Numbers) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    def seen(self, x, y, t, s):
         """Colours and disparity at real places of the picture of a camera at (t, s); each place may have its own."""
         far = self._texture(x + self.background * s, y + self.background * t, hue=0.0)
         near = self._texture(x + self.foreground * s, y + self.foreground * t, hue=2.0)
@@ -46,20 +39,20 @@ class TwoPlanes:
         disparity = np.where(in_front, self.foreground, self.background).astype(np.float32)
         return np.where(in_front[..., None], near, far), disparity
 
-    def _texture(self, x: NDArray[np.float64], y: NDArray[np.float64], hue: float) -> NDArray[np.float64]:
+    def _texture(self, x, y, hue):
         waves = [np.sin(0.31 * x + 0.17 * y + hue), np.sin(0.11 * x - 0.29 * y + 2 * hue), np.sin(0.23 * y + hue)]
         return 0.5 + self.contrast * np.stack(waves, axis=-1) + 0.1 * np.cos(hue)
 
-    def open(self, renderer: Renderer, grid: GridShape, with_disparity: bool = True) -> None:
+    def open(self, renderer, grid, with_disparity=True):
         """Open an empty field of this scene's size."""
         renderer.open_field(grid, self.width, self.height, hdr=False, with_disparity=with_disparity)
 
-    def upload(self, renderer: Renderer, grid: GridShape, row: int, column: int, with_disparity: bool = True) -> None:
+    def upload(self, renderer, grid, row, column, with_disparity=True):
         """Upload one view."""
         colors, disparity = self.view(grid.offset(row, column))
         renderer.upload_view(row, column, colors, disparity if with_disparity else None)
 
-    def fill(self, renderer: Renderer, grid: GridShape, with_disparity: bool = True) -> None:
+    def fill(self, renderer, grid, with_disparity=True):
         """Open the field and upload every view, and the surface behind the centre view's as the outer views show it."""
         self.open(renderer, grid, with_disparity)
         for at in np.ndindex(*grid):
@@ -73,7 +66,7 @@ class TwoPlanes:
 class PhotoLike(TwoPlanes):
     """Its waves are of many lengths, and the higher the longer, as in photos: blurred more, it is always smoother."""
 
-    def _texture(self, x: NDArray[np.float64], y: NDArray[np.float64], hue: float) -> NDArray[np.float64]:
+    def _texture(self, x, y, hue):
         random, waves = np.random.default_rng(round(hue)), np.zeros_like(x)
         for period in np.geomspace(6, 60, 30):
             angle, phase = 2 * np.pi * random.random(2)
@@ -81,7 +74,7 @@ class PhotoLike(TwoPlanes):
         return np.clip(0.5 + 0.0017 * waves[..., None] * np.array([1.0, 0.8, 0.6]), 0, 1)
 
 
-def through_lens(scene: TwoPlanes, optics: Optics, across: int = 24) -> NDArray[np.uint8]:
+def through_lens(scene, optics, across=24):
     """The picture by brute force: the mean, in linear light, of cameras `across` the opening in each direction, each
     seeing the scene itself.
     """
@@ -96,7 +89,7 @@ def through_lens(scene: TwoPlanes, optics: Optics, across: int = 24) -> NDArray[
     return np.rint(np.clip(srgb_from_linear(total / weights), 0, 1) * 255).astype(np.uint8)
 
 
-def camera_grid(optics: Optics, across: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def camera_grid(optics, across):
     """Places (N, 2) all over the opening, (t, s) from its middle, and how open it is there."""
     diameter = optics.aperture_diameter
     places = diameter * ((np.arange(across) + 0.5) / across - 0.5)
@@ -105,20 +98,20 @@ def camera_grid(optics: Optics, across: int) -> tuple[NDArray[np.float64], NDArr
     return np.stack([t, s], -1)[weights > 0], weights[weights > 0]
 
 
-def eyes_of_pixels(optics: Optics, scene: TwoPlanes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def eyes_of_pixels(optics, scene):
     """(t, s) at which each pixel's ray crosses the grid."""
     right, lower = from_middle(scene)
     aspect = scene.height / scene.width
     return optics.eye.t - optics.dolly * lower * aspect, optics.eye.s - optics.dolly * right
 
 
-def focus_of_pixels(optics: Optics, scene: TwoPlanes) -> NDArray[np.float64]:
+def focus_of_pixels(optics, scene):
     """The sharp disparity of each pixel."""
     right, lower = from_middle(scene)
     return optics.focus_disparity + optics.focus_tilt[0] * right + optics.focus_tilt[1] * lower
 
 
-def barrel_share(optics: Optics, scene: TwoPlanes, dt: float, ds: float) -> NDArray[np.float64]:
+def barrel_share(optics, scene, dt, ds):
     """1 where the barrel lets light through this place of the lens; in the corners it has moved by `cat_eye` radii."""
     shape, radius = optics.aperture_shape, optics.aperture_diameter / 2
     if shape.kind != "cat_eye":
@@ -128,24 +121,24 @@ def barrel_share(optics: Optics, scene: TwoPlanes, dt: float, ds: float) -> NDAr
     return (np.hypot(dt - by * scene.height * lower, ds - by * scene.width * right) < radius).astype(float)
 
 
-def from_middle(scene: TwoPlanes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def from_middle(scene):
     """Each pixel's place, -1 at the left and the upper border, 1 at the right and the lower one."""
     y, x = np.indices((scene.height, scene.width)) + 0.5
     return 2 * x / scene.width - 1, 2 * y / scene.height - 1
 
 
-def settled(renderer: Renderer, optics: Optics, scene: TwoPlanes) -> NDArray[np.uint8]:
+def settled(renderer, optics, scene):
     """The picture with every camera that it gets."""
     return renderer.converged_picture(RenderSettings(optics, ScreenSize(scene.width, scene.height)))
 
 
-def first_frame(renderer: Renderer, optics: Optics, scene: TwoPlanes) -> NDArray[np.uint8]:
+def first_frame(renderer, optics, scene):
     """The picture that is drawn at once."""
     renderer.render(optics, ScreenSize(scene.width, scene.height))
     return renderer.read_image()
 
 
-def open_views(renderer: Renderer, grid: GridShape, colors: NDArray[np.uint8], disparity: Numbers) -> None:
+def open_views(renderer, grid, colors, disparity):
     """Open a field whose views all have these colours (H, W, 3) and this disparity."""
     height, width = colors.shape[:2]
     renderer.open_field(grid, width, height, hdr=False, with_disparity=True)
@@ -153,19 +146,19 @@ def open_views(renderer: Renderer, grid: GridShape, colors: NDArray[np.uint8], d
         renderer.upload_view(*at, colors, np.full((height, width), disparity, np.float32))
 
 
-def rms(image: NDArray[np.uint8], expected: NDArray[np.uint8], border: int = 8) -> float:
+def rms(image, expected, border=8):
     """Root mean square difference inside the border, 1 = white."""
     inside = slice(border, -border)
     difference = image[inside, inside].astype(float) - expected[inside, inside]
     return float(np.sqrt(np.mean(difference**2)) / 255)
 
 
-def psnr(image: NDArray[np.uint8], expected: NDArray[np.uint8], border: int = 8) -> float:
+def psnr(image, expected, border=8):
     """Likeness inside the border, dB."""
     return float(-20 * np.log10(max(rms(image, expected, border), 1e-9)))
 
 
-def sharpness(image: NDArray[np.uint8], border: int = 8) -> float:
+def sharpness(image, border=8):
     """Mean step between neighbouring pixels inside the border, 1 = white."""
     inside = image[border:-border, border:-border].astype(float) / 255
     return float(np.abs(np.diff(inside, axis=0)).mean() + np.abs(np.diff(inside, axis=1)).mean())

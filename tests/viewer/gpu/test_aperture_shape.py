@@ -1,10 +1,7 @@
 """Openings against plain point tests: many points of a sample's square, each inside or not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_shape import opening
 from iibr_core.beyond.optics import ApertureMask, ApertureShape
@@ -14,7 +11,7 @@ WIDTH = 0.5
 T, S = np.meshgrid(np.arange(-5, 5.01, 0.25), np.arange(-5, 5.01, 0.25), indexing="ij")
 
 
-def is_inside(shape: ApertureShape, t: NDArray[np.float64], s: NDArray[np.float64]) -> NDArray[np.bool_]:
+def is_inside(shape, t, s):
     """Twin: whether a point lies in the opening; polygons as half planes through neighbouring corners."""
     if shape.kind == "ring":
         return (np.hypot(t, s) < DIAMETER / 2) & (np.hypot(t, s) > DIAMETER / 2 * shape.ring_inner)
@@ -29,7 +26,7 @@ def is_inside(shape: ApertureShape, t: NDArray[np.float64], s: NDArray[np.float6
     return inside
 
 
-def share_inside(shape: ApertureShape) -> NDArray[np.float64]:
+def share_inside(shape):
     """Twin: share of 20 x 20 points of each sample's square."""
     within = ((np.arange(20) + 0.5) / 20 - 0.5) * WIDTH
     return np.mean([is_inside(shape, T + dt, S + ds) for dt in within for ds in within], axis=0)
@@ -43,7 +40,7 @@ def share_inside(shape: ApertureShape) -> NDArray[np.float64]:
         ApertureShape("polygon", blades=11, rotation_deg=-70.0),
     ],
 )
-def test_openings_against_point_tests(shape: ApertureShape) -> None:
+def test_openings_against_point_tests(shape):
     weights, expected = opening(shape, T, S, DIAMETER, WIDTH), share_inside(shape)
     assert np.abs(weights - expected).max() < 0.4, "a corner's square is not a straight edge's"
     assert np.abs(weights - expected).mean() < 0.01
@@ -52,12 +49,12 @@ def test_openings_against_point_tests(shape: ApertureShape) -> None:
     assert weights.sum() == pytest.approx(expected.sum(), rel=0.01)
 
 
-def test_mask_lies_upright_and_turns_clockwise() -> None:
+def test_mask_lies_upright_and_turns_clockwise():
     values = np.zeros((4, 8), np.uint8)
     values[0, 0], values[3] = 255, 51  # upper left corner open, lowest row a fifth
     shape = ApertureShape("mask", mask=ApertureMask("corner", 4, 8, values.tobytes()))
 
-    def at(t: float, s: float, rotation_deg: float = 0.0) -> float:
+    def at(t, s, rotation_deg=0.0):
         turned = ApertureShape("mask", rotation_deg=rotation_deg, mask=shape.mask)
         return float(opening(turned, np.array([t]), np.array([s]), 8.0, 0.5)[0])
 

@@ -1,16 +1,14 @@
 """Contexts without a window: all kinds in one process, without loading what opens windows."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
 
-from viewer.gpu.context import Backend, create_headless, usual_backends
+from viewer.gpu.context import create_headless, usual_backends
 
 
-def test_contexts_come_and_go_in_one_process() -> None:
-    backends: list[Backend] = ["egl", "osmesa", "auto"]
+def test_contexts_come_and_go_in_one_process():
+    backends = ["egl", "osmesa", "auto"]
     for backend in backends:
         gl = create_headless(backend)
         assert backend in (gl.backend, "auto")
@@ -23,13 +21,13 @@ def test_contexts_come_and_go_in_one_process() -> None:
         gl.release()
 
 
-def test_other_systems_have_one_backend() -> None:
+def test_other_systems_have_one_backend():
     """The library knows it: naming EGL there can only fail."""
     assert usual_backends("linux") == ("egl", "osmesa")
     assert usual_backends("darwin") == usual_backends("win32") == ("system",)
 
 
-def test_pictures_without_a_window_load_no_window_library() -> None:
+def test_pictures_without_a_window_load_no_window_library():
     """They take their time before the first picture."""
     code = (
         "import sys\n"

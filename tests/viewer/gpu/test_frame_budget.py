@@ -1,20 +1,18 @@
 """How much a hurried picture leaves out follows from what drawing was seen to take; no clock is read here."""
 
-from __future__ import annotations
-
 import pytest
 
-from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS
 from viewer.gpu.refocus.frame_budget import OVERHEAD_S, FrameTimeModel, choose_quality_level, fetches_of
 
 PIXELS = 400_000
 
 
-def work_in(level: QualityLevel) -> float:
+def work_in(level):
     return fetches_of(round(12 * level.cameras), round(PIXELS * level.scale**2), warps=True)
 
 
-def test_more_time_means_less_haste() -> None:
+def test_more_time_means_less_haste():
     frame_time = FrameTimeModel(5e-9)
     chosen = [choose_quality_level(work_in, frame_time, budget_s, 0) for budget_s in (1.0, 0.1, 0.05, 0.02, 0.001)]
     assert chosen == sorted(chosen)
@@ -22,7 +20,7 @@ def test_more_time_means_less_haste() -> None:
     assert chosen[-1] == len(QUALITY_LEVELS) - 1, "at the least, something is drawn"
 
 
-def test_the_pace_is_learnt() -> None:
+def test_the_pace_is_learnt():
     frame_time, fetches = FrameTimeModel(5e-9), fetches_of(12, PIXELS, warps=True)
     for _ in range(12):
         frame_time.learn(fetches, 0.1)
@@ -30,7 +28,7 @@ def test_the_pace_is_learnt() -> None:
     assert frame_time.seconds(fetches / 4) == pytest.approx((0.1 - OVERHEAD_S) / 4 + OVERHEAD_S, 0.02)
 
 
-def test_a_picture_near_the_limit_does_not_change_back_and_forth() -> None:
+def test_a_picture_near_the_limit_does_not_change_back_and_forth():
     frame_time = FrameTimeModel(5e-9)
     budget_s = frame_time.seconds(work_in(QUALITY_LEVELS[3])) * 1.02
     worse = choose_quality_level(work_in, frame_time, budget_s / 1.05, 0)

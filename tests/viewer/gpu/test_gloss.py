@@ -1,19 +1,16 @@
 """Gloss as it is drawn live, against the core's views with gloss."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.gloss.geometry import SceneGeometry
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
-from iibr_core.gloss.shading import GlossMaps, make_gloss_maps, shade
+from iibr_core.gloss.shading import make_gloss_maps, shade
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import open_views, rms
 from viewer.gpu.inspection_passes import InspectionPasses, Line
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(3, 3)
 WIDTH, HEIGHT = 96, 72
@@ -21,17 +18,17 @@ LIT = Gloss(roughness=0.4, reflectance=0.3, light=GlossLight((0.1, -0.1, -1), (0
 METAL = Gloss(GlossSurface(), 0.2, 0.6, GlossLight((0.3, -0.2, -1)))
 
 
-def bump() -> np.ndarray:
+def bump():
     """Disparity (H, W) of a smooth hill."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     return (1 + 1.5 * np.exp(-(((x - 48) / 30) ** 2) - ((y - 36) / 25) ** 2)).astype(np.float32)
 
 
-def maps_of(gloss: Gloss, photo: np.ndarray, disparity: np.ndarray, infinity: float = -1.0) -> GlossMaps:
+def maps_of(gloss, photo, disparity, infinity=-1.0):
     return make_gloss_maps(gloss.surface, (photo / 255).astype(np.float32), disparity, SceneGeometry(100.0, infinity))
 
 
-def open_flat(renderer: Renderer, gloss: Gloss) -> tuple[np.ndarray, GlossMaps]:
+def open_flat(renderer, gloss):
     """A flat grey field with gloss, its photo and its maps."""
     photo, flat = np.full((HEIGHT, WIDTH, 3), 100, np.uint8), np.full((HEIGHT, WIDTH), 2.0, np.float32)
     open_views(renderer, GRID, photo, flat)
@@ -40,7 +37,7 @@ def open_flat(renderer: Renderer, gloss: Gloss) -> tuple[np.ndarray, GlossMaps]:
     return photo, maps
 
 
-def shaded(gloss: Gloss, maps: GlossMaps, photo: np.ndarray, eye: ViewOffset) -> np.ndarray:
+def shaded(gloss, maps, photo, eye):
     colors = (photo / 255).astype(np.float32)
     shade(colors, maps.disparity, eye, gloss, maps)
     return np.rint(np.clip(colors, 0, 1) * 255).astype(np.uint8)
@@ -48,7 +45,7 @@ def shaded(gloss: Gloss, maps: GlossMaps, photo: np.ndarray, eye: ViewOffset) ->
 
 @pytest.mark.parametrize("infinity", [-1.0, 1.6], ids=["all nearer than infinity", "some beyond infinity"])
 @pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
-def test_the_photo_with_gloss_is_the_cores(renderer: Renderer, gloss: Gloss, infinity: float) -> None:
+def test_the_photo_with_gloss_is_the_cores(renderer, gloss, infinity):
     photo, disparity = np.full((HEIGHT, WIDTH, 3), 100, np.uint8), bump()
     maps = maps_of(gloss, photo, disparity, infinity)
     renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
@@ -61,16 +58,15 @@ def test_the_photo_with_gloss_is_the_cores(renderer: Renderer, gloss: Gloss, inf
 
 
 @pytest.mark.parametrize(("gloss", "eye"), [(LIT, ViewOffset(0.5, -0.5)), (METAL, ViewOffset(-1.0, 1.0))])
-def test_other_viewpoints_are_the_cores_too(renderer: Renderer, gloss: Gloss, eye: ViewOffset) -> None:
+def test_other_viewpoints_are_the_cores_too(renderer, gloss, eye):
     photo, maps = open_flat(renderer, gloss)
     renderer.render(Optics(eye=eye, gloss=gloss), (WIDTH, HEIGHT))
     assert rms(renderer.read_image(), shaded(gloss, maps, photo, eye)) < 0.006
 
 
 @pytest.mark.parametrize(("gloss", "is_upright"), [(LIT, False), (METAL, True)])
-def test_an_epi_shows_every_views_gloss(renderer: Renderer, gloss: Gloss, is_upright: bool) -> None:
+def test_an_epi_shows_every_views_gloss(renderer, gloss, is_upright):
     photo, maps = open_flat(renderer, gloss)
-    assert renderer.field is not None
     passes = InspectionPasses(renderer.ctx, renderer.programs)
     place, long, count = (34, WIDTH, GRID.columns) if not is_upright else (50, HEIGHT, GRID.rows)
     line = Line(1, (place + 0.5) / (WIDTH if is_upright else HEIGHT), is_upright)

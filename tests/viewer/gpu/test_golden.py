@@ -1,18 +1,14 @@
 """Golden images, on one software rasteriser, through EGL and OSMesa alike. `pytest --regenerate-golden` writes them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
 from tests.viewer.gpu.scenes import TwoPlanes
-from viewer.gpu.context import Backend, create_headless
+from viewer.gpu.context import create_headless
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -33,7 +29,7 @@ PICTURES = {
 
 
 @pytest.mark.parametrize("backend", ["egl", "osmesa"])
-def test_pictures_are_the_golden_ones(backend: Backend, tmp_path: Path, regenerate_golden: bool) -> None:
+def test_pictures_are_the_golden_ones(backend, tmp_path, regenerate_golden):
     gl = create_headless(backend)
     if "llvmpipe" not in gl.renderer:
         gl.release()
@@ -50,7 +46,7 @@ def test_pictures_are_the_golden_ones(backend: Backend, tmp_path: Path, regenera
         assert_close(image, read_png(file), SAME_RASTERISER, tmp_path, name)
 
 
-def drawn(renderer: Renderer, views: list[int], optics: Optics) -> NDArray[np.uint8]:
+def drawn(renderer, views, optics):
     SCENE.fill(renderer, GRID)
     if views != EVERY_VIEW:  # the surface behind the photo's is not known yet
         SCENE.open(renderer, GRID)

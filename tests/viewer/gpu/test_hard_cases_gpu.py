@@ -3,12 +3,9 @@
 Expected everywhere: no GL error (the `gl` fixture looks), and a picture within the range of what the views show.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +19,6 @@ from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, open_views, rms
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height
@@ -30,19 +26,19 @@ GRID = GridShape(3, 3)
 COLOR = (10, 130, 250)
 
 
-def picture(renderer: Renderer, optics: Optics, size: tuple[int, int] = SIZE) -> np.ndarray:
+def picture(renderer, optics, size=SIZE):
     renderer.render(optics, size)
     return renderer.read_image().astype(int)
 
 
-def open_constant(renderer: Renderer, disparity: float, size: tuple[int, int] = SIZE) -> None:
+def open_constant(renderer, disparity, size=SIZE):
     """A field of one colour whose half is near, the other far."""
     width, height = size
     values = np.where(np.arange(width) < width // 2, disparity, -disparity)
     open_views(renderer, GRID, np.full((height, width, 3), COLOR, np.uint8), values)
 
 
-def test_aperture_0_is_the_pinhole_picture(renderer: Renderer, tmp_path: Path) -> None:
+def test_aperture_0_is_the_pinhole_picture(renderer, tmp_path):
     """The stored view, whatever the focus; a negative one is none either."""
     SCENE.fill(renderer, GRID)
     view = SCENE.view(ViewOffset(1.0, -1.0))[0]
@@ -51,7 +47,7 @@ def test_aperture_0_is_the_pinhole_picture(renderer: Renderer, tmp_path: Path) -
         assert_close(picture(renderer, optics).astype(np.uint8), view, ROUNDING, tmp_path)
 
 
-def test_an_aperture_larger_than_the_grid_sees_all_views(renderer: Renderer) -> None:
+def test_an_aperture_larger_than_the_grid_sees_all_views(renderer):
     """Once it holds the whole grid, opening it further changes nothing but what lies beyond the stored views."""
     SCENE.fill(renderer, GRID)
     pictures = [picture(renderer, Optics(focus_disparity=2.0, aperture_diameter=d)) for d in (8.0, 1e3, 1e30)]
@@ -61,7 +57,7 @@ def test_an_aperture_larger_than_the_grid_sees_all_views(renderer: Renderer) -> 
 
 
 @pytest.mark.parametrize("far", [1e2, 3e38])
-def test_view_offset_far_outside_the_grid(renderer: Renderer, far: float) -> None:
+def test_view_offset_far_outside_the_grid(renderer, far):
     """Colours of the scene are shown: the stored views end, so their edges are continued."""
     open_constant(renderer, 1.5)
     for optics in (Optics(ViewOffset(far, -far)), Optics(ViewOffset(-far, 0.0), aperture_diameter=2.0)):
@@ -69,7 +65,7 @@ def test_view_offset_far_outside_the_grid(renderer: Renderer, far: float) -> Non
 
 
 @pytest.mark.parametrize("disparity", [0.0, 500.0, 3e38])
-def test_disparities_of_any_size(renderer: Renderer, disparity: float) -> None:
+def test_disparities_of_any_size(renderer, disparity):
     """All equal (0), larger than the image, beyond half floats: through a pinhole one colour stays one colour.
 
     Through a lens too, up to some 2000 px of defocus a view step; half floats then lose light of what is behind.
@@ -96,7 +92,7 @@ eyes = st.floats(*eye_limits(3))
     )
 )
 @example(Optics(dolly=5e-324))
-def test_refocus_of_a_constant_photo_is_constant(renderer: Renderer, optics: Optics) -> None:
+def test_refocus_of_a_constant_photo_is_constant(renderer, optics):
     """Whatever the eye, dolly, focus, tilt, range and aperture that the viewer allows: weights are weights."""
     if renderer.field is None:
         open_constant(renderer, 4.0)
@@ -104,14 +100,14 @@ def test_refocus_of_a_constant_photo_is_constant(renderer: Renderer, optics: Opt
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 13), (7, 13)])
-def test_tiny_thin_and_prime_sized_views(renderer: Renderer, size: tuple[int, int]) -> None:
+def test_tiny_thin_and_prime_sized_views(renderer, size):
     open_constant(renderer, 2.0, size)
     for optics in (Optics(ViewOffset(0.5, -0.5)), Optics(aperture_diameter=3.0, focus_disparity=1.0)):
         for drawn in (size, (5, 3), (64, 40)):
             assert np.abs(picture(renderer, optics, drawn) - COLOR).max() <= 1
 
 
-def test_float16_sums_of_289_views(renderer: Renderer) -> None:
+def test_float16_sums_of_289_views(renderer):
     """Light far beyond white, summed over 17x17 half-float views, does not drift: within two steps of 8 bits."""
     grid, light = GridShape(17, 17), 3.0
     renderer.open_field(grid, 8, 6, hdr=True, with_disparity=False)
@@ -126,7 +122,7 @@ def test_float16_sums_of_289_views(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("with_disparity", [True, False])
-def test_a_grid_of_1x1(renderer: Renderer, tmp_path: Path, with_disparity: bool) -> None:
+def test_a_grid_of_1x1(renderer, tmp_path, with_disparity):
     """The photo through a pinhole; through a lens it stays a picture, of its own brightness."""
     SCENE.fill(renderer, GridShape(1, 1), with_disparity)
     photo = SCENE.view(ViewOffset(0.0, 0.0))[0]
@@ -136,7 +132,7 @@ def test_a_grid_of_1x1(renderer: Renderer, tmp_path: Path, with_disparity: bool)
     assert light == pytest.approx(1, abs=0.05)
 
 
-def test_a_one_pixel_wire(renderer: Renderer) -> None:
+def test_a_one_pixel_wire(renderer):
     """Between stored views it is still there, about as bright and as wide as it is."""
     width, height, foreground = 40, 24, 3.0
     renderer.open_field(GRID, width, height, hdr=False, with_disparity=True)

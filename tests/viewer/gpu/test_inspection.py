@@ -1,9 +1,5 @@
 """The passes of inspection against plain numpy: EPIs, sheet, overlays, views read background, who sees a surface."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -11,10 +7,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
-from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
-from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.layout import PixelRect
 
@@ -25,19 +18,18 @@ BAND = 4
 
 
 @pytest.fixture
-def passes(gl: GLContext, renderer: Renderer) -> Iterator[InspectionPasses]:
+def passes(gl, renderer):
     made = InspectionPasses(gl.ctx, renderer.programs)
     yield made
     made.release()
 
 
-def full(renderer: Renderer) -> LightFieldTexture:
+def full(renderer):
     SCENE.fill(renderer, GRID)
-    assert renderer.field is not None
     return renderer.field
 
 
-def test_an_epi_is_one_line_of_every_view_of_its_row(renderer: Renderer, passes: InspectionPasses) -> None:
+def test_an_epi_is_one_line_of_every_view_of_its_row(renderer, passes):
     line = Line(1, (30 + 0.5) / SCENE.height)
     passes.draw_epi(full(renderer), line, (SCENE.width, BAND * GRID.columns), 1.0)
     epi = passes.read("across")[..., :3].reshape(GRID.columns, BAND, SCENE.width, 3)[:, 1]
@@ -45,7 +37,7 @@ def test_an_epi_is_one_line_of_every_view_of_its_row(renderer: Renderer, passes:
     np.testing.assert_allclose(epi, expected, atol=1)
 
 
-def test_an_upright_epi_is_one_column_of_every_view_of_its_column(renderer: Renderer, passes: InspectionPasses) -> None:
+def test_an_upright_epi_is_one_column_of_every_view_of_its_column(renderer, passes):
     line = Line(4, (50 + 0.5) / SCENE.width, is_upright=True)
     passes.draw_epi(full(renderer), line, (BAND * GRID.rows, SCENE.height), 1.0)
     epi = passes.read("upright")[..., :3].reshape(SCENE.height, GRID.rows, BAND, 3)[:, :, 1]
@@ -54,7 +46,7 @@ def test_an_upright_epi_is_one_column_of_every_view_of_its_column(renderer: Rend
 
 
 @pytest.mark.parametrize("stops", [-2.0, 1.5])
-def test_exposure_is_a_factor_of_light(renderer: Renderer, passes: InspectionPasses, stops: float) -> None:
+def test_exposure_is_a_factor_of_light(renderer, passes, stops):
     field = full(renderer)
     passes.draw_view(field, 1, 2, "photo", 2.0**stops)
     light = linear_from_srgb(SCENE.view(GRID.offset(1, 2))[0] / 255) * 2.0**stops
@@ -62,13 +54,10 @@ def test_exposure_is_a_factor_of_light(renderer: Renderer, passes: InspectionPas
     np.testing.assert_allclose(passes.read("photo")[..., :3], expected, atol=2)
 
 
-def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(
-    renderer: Renderer, passes: InspectionPasses
-) -> None:
+def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(renderer, passes):
     SCENE.open(renderer, GRID)
     SCENE.upload(renderer, GRID, *GRID.centre)
     field = renderer.field
-    assert field is not None
     cells = PixelRect(2, 3, 48, 36), PixelRect(60, 3, 48, 36)
     passes.start_sheet((110, 60))
     passes.draw_on_sheet(field, *GRID.centre, cells[0], 1.0)
@@ -88,9 +77,7 @@ def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(
 LOOK = OverlayStyle(VIRIDIS, (-1.0, 2.0), opacity=0.5)
 
 
-def test_the_disparity_overlay_at_a_stored_view_is_its_map_in_colours(
-    renderer: Renderer, passes: InspectionPasses
-) -> None:
+def test_the_disparity_overlay_at_a_stored_view_is_its_map_in_colours(renderer, passes):
     view = (1, 5)
     passes.draw_overlay(full(renderer), Optics(eye=GRID.offset(*view)), view, SIZE, LOOK)
     overlay = passes.read("overlay")
@@ -101,9 +88,7 @@ def test_the_disparity_overlay_at_a_stored_view_is_its_map_in_colours(
 
 
 @pytest.mark.parametrize("eye", [ViewOffset(0.4, -0.3), ViewOffset(-2.7, 3.4)])
-def test_between_views_the_overlay_lies_where_the_eye_sees_the_surfaces(
-    renderer: Renderer, passes: InspectionPasses, eye: ViewOffset
-) -> None:
+def test_between_views_the_overlay_lies_where_the_eye_sees_the_surfaces(renderer, passes, eye):
     view = min(4, max(0, round(eye.t) + 2)), min(6, max(0, round(eye.s) + 3))
     passes.draw_overlay(full(renderer), Optics(eye=eye), view, SIZE, LOOK)
     near = passes.read("overlay")[..., 0].astype(int) > 128  # viridis: only its light end is red
@@ -111,7 +96,7 @@ def test_between_views_the_overlay_lies_where_the_eye_sees_the_surfaces(
     assert (near != (SCENE.view(eye)[1] > 0)).mean() < 0.01
 
 
-def test_values_are_laid_over_the_surface_they_belong_to(renderer: Renderer, passes: InspectionPasses) -> None:
+def test_values_are_laid_over_the_surface_they_belong_to(renderer, passes):
     """A mask of the disc, known in the middle view, covers the disc from another eye."""
     mask = (SCENE.view(ViewOffset(0, 0))[1] > 0).astype(np.uint8) * 255
     eye = ViewOffset(1.0, -2.0)

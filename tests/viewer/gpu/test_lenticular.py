@@ -2,20 +2,17 @@
 
 import json
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.lenticular import Calibration, parse_calibration
+from iibr_core.formats.lenticular import parse_calibration
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize
-from viewer.gpu.context import GLContext
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.weaving import Weaver
 from viewer.model.state.stereo import Weave
@@ -32,7 +29,7 @@ CELLS = {
     "landscape": [(-0.31, 0.25, 0.28, 0.25, 0.0, -0.25), (-0.31, -0.25, 0.28, -0.25, 0.0, 0.25)],
     "portrait": [(-0.25, -0.31, -0.25, 0.28, 0.25, 0.0), (0.25, -0.31, 0.25, 0.28, -0.25, 0.0)],
 }
-DISPLAYS: dict[str, dict[str, Any]] = {
+DISPLAYS = {
     "portrait": {},
     "landscape": {"pitch": 50.0693, "slope": -7.522, "center": 0.0764, "DPI": 283, "screenW": 320, "screenH": 180},
     "leaning right": {"pitch": 49.8, "slope": 5.48, "center": 0, "DPI": 338, "screenW": 256, "screenH": 160},
@@ -57,13 +54,13 @@ PARALLAX = 0.004
 """Motion of the nearest surface from view to view, as a share of the width."""
 
 
-def stated(name: str) -> dict[str, Any]:
+def stated(name):
     cells = {key: [dict(zip(CELL_KEYS, cell)) for cell in value] for key, value in CELLS.items()}
     return PORTRAIT | {key: cells.get(value, {"value": value}) if isinstance(value, str) else {"value": value}
                        for key, value in (DISPLAYS | CHECKERBOARD)[name].items()}  # fmt: skip
 
 
-def views() -> NDArray[np.uint8]:
+def views():
     """Views (V, H, W, 3) of two crossing patterns, one that stays and one that moves to the left."""
     y, x = ((np.arange(side) + 0.5) / side for side in TILE)
     s = np.arange(VIEWS)[:, None, None]
@@ -72,11 +69,11 @@ def views() -> NDArray[np.uint8]:
     return np.rint(127.5 + 55 * np.stack(waves, -1)).astype(np.uint8)
 
 
-def display_of(name: str) -> Calibration:
+def display_of(name):
     return parse_calibration(json.dumps(stated(name)), "a display")
 
 
-def woven(gl: GLContext, name: str) -> NDArray[np.uint8]:
+def woven(gl, name):
     """The views woven for a display."""
     programs, display = ProgramCache(gl.ctx), display_of(name)
     weaver, tile = Weaver(gl.ctx, programs), ScreenSize(TILE.width, TILE.height)
@@ -89,7 +86,6 @@ def woven(gl: GLContext, name: str) -> NDArray[np.uint8]:
             texels = np.dstack([view[::-1], np.full(TILE, 255, np.uint8)])
             sheet.color_attachments[0].write(texels.tobytes(), sheet.viewport)
         weaver.weave(weave, tile)
-        assert weaver.screen is not None
         return weaver.screen.read()
     finally:
         weaver.release()
@@ -97,7 +93,7 @@ def woven(gl: GLContext, name: str) -> NDArray[np.uint8]:
 
 
 @pytest.mark.parametrize("name", DISPLAYS)
-def test_each_side_sees_its_view(gl: GLContext, name: str) -> None:
+def test_each_side_sees_its_view(gl, name):
     numbers, screen = plain(stated(name)), woven(gl, name)
     right = side_of_light(numbers)
     for view in (0, 1, 24, 47):
@@ -109,18 +105,18 @@ def test_each_side_sees_its_view(gl: GLContext, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [*DISPLAYS, *CHECKERBOARD])
-def test_the_shader_does_as_its_slow_twin(gl: GLContext, name: str) -> None:
+def test_the_shader_does_as_its_slow_twin(gl, name):
     drawn, expected = woven(gl, name).astype(float), twin(display_of(name))
     differs = np.abs(drawn - expected) > 2
     assert differs.mean() < 2e-3, "rounding may end a lens one subpixel earlier"
 
 
-def plain(calibration: dict[str, Any]) -> dict[str, Any]:
+def plain(calibration):
     """The numbers of a calibration without what they are wrapped in."""
     return {key: value["value"] if isinstance(value, dict) else value for key, value in calibration.items()}
 
 
-def side_of_light(numbers: dict[str, Any]) -> NDArray[np.float64]:
+def side_of_light(numbers):
     """How far to the right the light of each subpixel leaves, from 0 to 1, (H, W, 3).
 
     Lenses are long cylinders; light leaves to the side that lies across the axis of its lens. Lengths in inches.
@@ -146,7 +142,7 @@ def side_of_light(numbers: dict[str, Any]) -> NDArray[np.float64]:
     return 1 - from_left_edge if numbers["invView"] else from_left_edge
 
 
-def gathered(screen: NDArray[np.uint8], right: NDArray[np.float64], view: int) -> NDArray[np.float64]:
+def gathered(screen, right, view):
     """What an eye sees that stands where a view belongs: the subpixels that shine there, with their gaps filled."""
     weights = np.clip(1 - np.abs(right * VIEWS - 0.5 - view), 0, None)
     light, shares = (gaussian_filter(each, (BLUR_PX, BLUR_PX, 0)) for each in (screen * weights, weights))
@@ -154,26 +150,26 @@ def gathered(screen: NDArray[np.uint8], right: NDArray[np.float64], view: int) -
 
 
 @cache
-def enlarged(height: int, width: int) -> NDArray[np.float32]:
+def enlarged(height, width):
     """The views (V, H, W, 3) as large as a screen."""
     rows, columns = (interpolation(*sides) for sides in zip((height, width), TILE))
     wide = np.einsum("xt,vrtc->vrxc", columns, views() / np.float32(255), optimize=True)
     return np.einsum("yr,vrxc->vyxc", rows, wide, optimize=True)
 
 
-def interpolation(size: int, texels: int) -> NDArray[np.float32]:
+def interpolation(size, texels):
     """The weights (size, texels) of linear interpolation between the middles of texels."""
     at = np.clip((np.arange(size)[:, None] + 0.5) * texels / size - 0.5, 0, texels - 1)
     return np.clip(1 - np.abs(at - np.arange(texels)), 0, None).astype(np.float32)
 
 
 @cache
-def softened(height: int, width: int) -> NDArray[np.float32]:
+def softened(height, width):
     """The views as large as a screen, and no sharper than what can be gathered."""
     return gaussian_filter(enlarged(height, width), (0, BLUR_PX, BLUR_PX, 0))
 
 
-def twin(display: Calibration) -> NDArray[np.float64]:
+def twin(display):
     """The woven picture, one colour after the other."""
     (height, width), large = display.screen, enlarged(*display.screen)
     large = large[:, :: -1 if display.is_mirrored[1] else 1, :: -1 if display.is_mirrored[0] else 1]

@@ -1,20 +1,17 @@
 """The texture arrays: what is stored, and plain words where they do not fit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.photo import size_within
 from iibr_core.types import GridShape, ImageSize, InputError
-from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box, LightFieldTexture, check_fits
+from viewer.gpu.light_field_texture import LightFieldTexture, check_fits
 
 GRID = GridShape(2, 3)
 
 
-def test_stores_root_of_linear_light_in_the_views_own_layer(gl: GLContext) -> None:
+def test_stores_root_of_linear_light_in_the_views_own_layer(gl):
     field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
     colors = np.arange(4 * 8 * 3, dtype=np.uint8).reshape(4, 8, 3) * 2
     disparity = np.linspace(-2, 3, 32, dtype=np.float32).reshape(4, 8)
@@ -33,7 +30,7 @@ def test_stores_root_of_linear_light_in_the_views_own_layer(gl: GLContext) -> No
     field.release()
 
 
-def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl: GLContext) -> None:
+def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl):
     field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
     once = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
     draft, final = np.zeros((4, 8, 3), np.uint8), np.full((4, 8, 3), 90, np.uint8)
@@ -54,7 +51,7 @@ def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl: GLContext) -> 
 @pytest.mark.parametrize(
     ("box", "hdr"), [(np.s_[0:37, 0:53], True), (np.s_[5:6, 7:8], False), (np.s_[15:33, 20:53], False)]
 )
-def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLContext, box: Box, hdr: bool) -> None:
+def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl, box, hdr):
     random = np.random.default_rng(0)
     colors = random.integers(0, 255, (37, 53, 3)).astype(np.float16 if hdr else np.uint8)
     before = random.normal(size=(37, 53)).astype(np.float32)
@@ -74,7 +71,7 @@ def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLCont
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize(("wild", "hdr"), [(-3e38, False), (3.4e38, True)])
-def test_the_largest_disparities_stay_finite(gl: GLContext, wild: float, hdr: bool) -> None:
+def test_the_largest_disparities_stay_finite(gl, wild, hdr):
     field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr, with_disparity=True)
     colors = np.zeros((4, 8, 3), np.float16 if hdr else np.uint8)
     disparity = np.tile(np.float32([wild, -wild, 0, 1, 2, 3, 4, 5]), (4, 1))
@@ -89,13 +86,13 @@ def test_the_largest_disparities_stay_finite(gl: GLContext, wild: float, hdr: bo
     field.release()
 
 
-def test_too_many_views_say_what_fits(gl: GLContext) -> None:
+def test_too_many_views_say_what_fits(gl):
     side = int(gl.ctx.info["GL_MAX_ARRAY_TEXTURE_LAYERS"] ** 0.5) + 1
     with pytest.raises(InputError, match=rf"{side}x{side} needs {side * side} texture layers.*at most {side - 1}x"):
         LightFieldTexture(gl.ctx, GridShape(side, side), 4, 4, hdr=False, with_disparity=False)
 
 
-def test_views_longer_than_the_driver_allows_are_told_the_size_that_fits(gl: GLContext) -> None:
+def test_views_longer_than_the_driver_allows_are_told_the_size_that_fits(gl):
     width, height = 5 * gl.max_texture_size // 2, 30
     with pytest.raises(InputError, match=r"the largest photo has \d+ pixels$") as error:
         check_fits(gl.ctx, GridShape(3, 3), width, height)

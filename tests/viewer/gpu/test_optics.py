@@ -1,7 +1,5 @@
 """Every part of the optics against brute force: shape, cat's-eye, tilt, range, highlights, dolly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +10,6 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, eyes_of_pixels, first_frame, open_views, rms, settled, through_lens
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes()
@@ -32,7 +29,7 @@ BAND = slice(10, -10)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_shapes_against_brute_force(renderer: Renderer, shape: ApertureShape) -> None:
+def test_shapes_against_brute_force(renderer, shape):
     WALL.fill(renderer, GRID)
     optics = replace(FAR_OFF, eye=ViewOffset(0.3, -0.4), aperture_shape=shape)
     image, truth = settled(renderer, optics, WALL), through_lens(WALL, optics)
@@ -41,14 +38,14 @@ def test_shapes_against_brute_force(renderer: Renderer, shape: ApertureShape) ->
     assert rms(image, disc) > 2 * rms(image, truth)
 
 
-def test_an_empty_mask_is_a_pinhole_not_a_black_picture(renderer: Renderer) -> None:
+def test_an_empty_mask_is_a_pinhole_not_a_black_picture(renderer):
     SCENE.fill(renderer, GRID)
     closed = ApertureShape("mask", mask=ApertureMask("closed", 2, 2, bytes(4)))
     image = settled(renderer, Optics(aperture_diameter=3.0, aperture_shape=closed), SCENE)
     assert np.abs(image.astype(int) - SCENE.view(CENTRE)[0]).max() <= 1
 
 
-def test_tilt_against_brute_force(renderer: Renderer) -> None:
+def test_tilt_against_brute_force(renderer):
     tilt = (3.0, -4.0)
     WALL.fill(renderer, GRID)
     optics = Optics(focus_disparity=0.5, focus_tilt=tilt, aperture_diameter=3.0)
@@ -59,7 +56,7 @@ def test_tilt_against_brute_force(renderer: Renderer) -> None:
         assert rms(image, through_lens(WALL, replace(optics, focus_tilt=wrong))) > 1.3 * difference
 
 
-def test_focus_range_leaves_what_is_beyond_it_less_defocused(renderer: Renderer) -> None:
+def test_focus_range_leaves_what_is_beyond_it_less_defocused(renderer):
     """Half a range from the focus to the wall leaves the other half as blur: like a lens half as wide."""
     WALL.fill(renderer, GRID)
     ranged = settled(renderer, Optics(focus_disparity=3.0, focus_range=2.0, aperture_diameter=3.0), WALL)
@@ -68,7 +65,7 @@ def test_focus_range_leaves_what_is_beyond_it_less_defocused(renderer: Renderer)
     assert rms(ranged, through_lens(WALL, Optics(focus_disparity=1.5, aperture_diameter=3.0))) > 0.008
 
 
-def test_highlights_count_for_more(renderer: Renderer) -> None:
+def test_highlights_count_for_more(renderer):
     """A white square far out of focus: all its light in the picture, against the formula. Its borders, where pixels are
     interpolated with dark ones, are no highlights.
     """
@@ -84,7 +81,7 @@ def test_highlights_count_for_more(renderer: Renderer) -> None:
     assert counted == pytest.approx(1 + HIGHLIGHT_GAIN * recovery - dark, rel=0.2)
 
 
-def test_saturated_colours_are_no_highlights(renderer: Renderer) -> None:
+def test_saturated_colours_are_no_highlights(renderer):
     """A red wall whose red clips here and there: it shows the same with highlights recovered as without."""
     colors = np.full((30, 40, 3), (250, 90, 10), np.uint8)
     colors[::3, ::4, 0] = 255
@@ -94,17 +91,17 @@ def test_saturated_colours_are_no_highlights(renderer: Renderer) -> None:
     assert np.abs(plain.astype(int) - recovered).max() <= 2
 
 
-def test_dolly_through_a_pinhole_against_the_scene(renderer: Renderer) -> None:
+def test_dolly_through_a_pinhole_against_the_scene(renderer):
     """The scene itself seen along each pixel's own ray, also where that crosses beside the grid."""
     SCENE.fill(renderer, GRID)
     optics = Optics(ViewOffset(0.25, -0.5), dolly=6.0)
-    truth, _ = SCENE.view(ViewOffset(*eyes_of_pixels(optics, SCENE)))  # type: ignore[arg-type]
+    truth, _ = SCENE.view(ViewOffset(*eyes_of_pixels(optics, SCENE)))
     image = settled(renderer, optics, SCENE)
     assert np.median(np.abs(image.astype(int) - truth)[BAND, BAND]) <= 1
     assert rms(image, truth, border=14) < 0.035
 
 
-def test_dolly_through_a_lens_against_brute_force(renderer: Renderer) -> None:
+def test_dolly_through_a_lens_against_brute_force(renderer):
     WALL.open(renderer, GRID)
     order = sorted(np.ndindex(*GRID), key=lambda at: np.hypot(at[0] - 2, at[1] - 2))
     for at in order[:9]:

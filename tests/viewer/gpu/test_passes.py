@@ -1,7 +1,5 @@
 """The pass that sums up light: both searches, mirror images, draws in parts; nothing is made again for an edit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, settled
 from viewer.gpu.refocus import passes
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=96, background=-4.0, foreground=5.0, radius_px=25.0)
@@ -19,9 +16,7 @@ SCENE = TwoPlanes(width=160, height=96, background=-4.0, foreground=5.0, radius_
     "optics",
     [Optics(ViewOffset(0.4, -0.7)), Optics(ViewOffset(0.4, -0.7), focus_disparity=5.0, aperture_diameter=3.0)],
 )
-def test_three_steps_find_the_same_surfaces_as_the_whole_search(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, optics: Optics
-) -> None:
+def test_three_steps_find_the_same_surfaces_as_the_whole_search(renderer, monkeypatch, optics):
     """Up to a view step away, and 8 px of parallax: they differ only beside edges, which the whole search avoids."""
     SCENE.fill(renderer, GRID)
     images, programs = [], []
@@ -34,7 +29,7 @@ def test_three_steps_find_the_same_surfaces_as_the_whole_search(
     assert rms(images[0], images[1]) < 0.006
 
 
-def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
+def test_outside_all_views_mirror_images_stand_in(renderer):
     """Seen from far beside the grid, a flat scene goes on as its mirror image: no streaks."""
     scene = TwoPlanes(width=96, height=64, background=6.0, foreground=6.0)
     grid = GridShape(3, 3)

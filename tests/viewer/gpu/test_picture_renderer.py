@@ -1,9 +1,6 @@
 """The picture against the scene itself: pinhole view, lens, exposure, and every state in between."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, psnr, rms, settled, through_lens
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 CENTRE = ViewOffset(0.0, 0.0)
@@ -24,12 +20,12 @@ GROWTH = 0.004
 """How much a view that arrives may worsen the picture (rms, 1 = white): one more view moves a depth edge by a pixel."""
 
 
-def picture(renderer: Renderer, scene: TwoPlanes = SCENE, **optics: object) -> np.ndarray:
-    renderer.render(Optics(**optics), (scene.width, scene.height))  # type: ignore[arg-type]
+def picture(renderer, scene=SCENE, **optics):
+    renderer.render(Optics(**optics), (scene.width, scene.height))
     return renderer.read_image()
 
 
-def test_centre_through_a_pinhole_is_the_photo(renderer: Renderer, tmp_path: Path) -> None:
+def test_centre_through_a_pinhole_is_the_photo(renderer, tmp_path):
     random = np.random.default_rng(0)
     photo = random.integers(0, 256, (40, 60, 3), dtype=np.uint8)
     renderer.open_field(GridShape(9, 9), 60, 40, hdr=False, with_disparity=True)
@@ -39,14 +35,14 @@ def test_centre_through_a_pinhole_is_the_photo(renderer: Renderer, tmp_path: Pat
 
 
 @pytest.mark.parametrize("with_disparity", [True, False])
-def test_pinhole_at_stored_views_is_those_views(renderer: Renderer, tmp_path: Path, with_disparity: bool) -> None:
+def test_pinhole_at_stored_views_is_those_views(renderer, tmp_path, with_disparity):
     SCENE.fill(renderer, GRID, with_disparity)
     for row, column in [(0, 0), (4, 1)]:
         eye = GRID.offset(row, column)
         assert_close(picture(renderer, eye=eye), SCENE.view(eye)[0], ROUNDING, tmp_path, f"view_{row}_{column}")
 
 
-def test_pinhole_between_views_against_the_scene(renderer: Renderer) -> None:
+def test_pinhole_between_views_against_the_scene(renderer):
     SCENE.fill(renderer, GRID)
     for eye in (ViewOffset(0.5, 0.5), ViewOffset(1.9, -1.7)):
         truth = SCENE.view(eye)[0]
@@ -55,7 +51,7 @@ def test_pinhole_between_views_against_the_scene(renderer: Renderer) -> None:
         assert np.median(np.abs(image.astype(int) - truth)) <= 1
 
 
-def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer: Renderer) -> None:
+def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer):
     scene = TwoPlanes(radius_px=0.0)
     scene.fill(renderer, GRID)
     optics = Optics(ViewOffset(0.0, 4.0), focus_disparity=2.0, aperture_diameter=3.0)
@@ -64,7 +60,7 @@ def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer: Renderer) 
 
 
 @pytest.mark.parametrize(("focus", "diameter"), [(-1.0, 2.0), (2.0, 8.0)])
-def test_lens_against_brute_force(renderer: Renderer, focus: float, diameter: float) -> None:
+def test_lens_against_brute_force(renderer, focus, diameter):
     SCENE.fill(renderer, GRID)
     optics = Optics(focus_disparity=focus, aperture_diameter=diameter)
     image = settled(renderer, optics, SCENE)
@@ -74,7 +70,7 @@ def test_lens_against_brute_force(renderer: Renderer, focus: float, diameter: fl
         assert psnr(image, through_lens(SCENE, wrong), border=14) < likeness - 3
 
 
-def test_error_never_grows_while_the_field_fills(renderer: Renderer) -> None:
+def test_error_never_grows_while_the_field_fills(renderer):
     SCENE.fill(renderer, GRID)
     optics, size = Optics(ViewOffset(1.2, -0.6)), (SCENE.width, SCENE.height)
     renderer.render(optics, size)
@@ -93,7 +89,7 @@ def test_error_never_grows_while_the_field_fills(renderer: Renderer) -> None:
     assert max(after - min(errors[: k + 1]) for k, after in enumerate(errors)) < GROWTH, errors
 
 
-def test_views_without_disparity_are_sheared_to_the_focus(renderer: Renderer, tmp_path: Path) -> None:
+def test_views_without_disparity_are_sheared_to_the_focus(renderer, tmp_path):
     """Halfway between two views, with focus on a plane: that plane is where it should be, seen from in between."""
     scene = TwoPlanes(background=2.0, foreground=2.0)
     scene.fill(renderer, GRID, with_disparity=False)
@@ -103,7 +99,7 @@ def test_views_without_disparity_are_sheared_to_the_focus(renderer: Renderer, tm
     assert_close(image[inside, inside], scene.view(eye)[0][inside, inside], FILTERING, tmp_path)
 
 
-def test_exposure_and_srgb_of_hdr(renderer: Renderer) -> None:
+def test_exposure_and_srgb_of_hdr(renderer):
     ramp = np.geomspace(0.001, 30, 48).astype(np.float16)
     colors = np.repeat(ramp[None, :, None], 4, axis=0).repeat(3, axis=2)
     renderer.open_field(GridShape(1, 1), 48, 4, hdr=True, with_disparity=False)
@@ -114,7 +110,7 @@ def test_exposure_and_srgb_of_hdr(renderer: Renderer) -> None:
         assert np.abs(renderer.read_image()[2, :, 0] - expected).max() <= 1
 
 
-def test_what_is_in_focus_is_never_black_however_few_samples_the_lens_has(renderer: Renderer) -> None:
+def test_what_is_in_focus_is_never_black_however_few_samples_the_lens_has(renderer):
     """At this eye and aperture none of the few samples is one of every other."""
     scene = TwoPlanes(width=192, height=144, background=0.0, foreground=8.0)
     scene.fill(renderer, GridShape(5, 5))

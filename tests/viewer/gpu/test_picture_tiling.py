@@ -1,7 +1,5 @@
 """Pictures drawn in parts: nothing twice, nothing left out, no seams, and light beyond 8 bits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,9 +9,7 @@ from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
-from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.picture_drawing import MAX_TILE_PX, picture_tiles
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=1.0, radius_px=25.0)
@@ -21,7 +17,7 @@ LARGE = 384, 256
 
 
 @given(width=st.integers(1, 900), height=st.integers(1, 70), largest=st.integers(64, 400))
-def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: int, largest: int) -> None:
+def test_every_pixel_is_kept_once_and_no_part_is_too_large(width, height, largest):
     kept = np.zeros((height, width), np.uint8)
     for part in picture_tiles((width, height), largest):
         assert max(part.size_px) <= min(largest, MAX_TILE_PX)
@@ -41,7 +37,7 @@ OPTICS = [
 ]
 
 
-def test_parts_have_no_seams(renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_have_no_seams(renderer, gl, monkeypatch):
     SCENE.fill(renderer, GRID)
     optics = OPTICS[2]
     whole = renderer.converged_picture(RenderSettings(optics, LARGE)).astype(int)
@@ -53,7 +49,7 @@ def test_parts_have_no_seams(renderer: Renderer, gl: GLContext, monkeypatch: pyt
     assert np.mean(difference) < 0.05
 
 
-def test_the_converged_picture_is_what_refining_ends_at(renderer: Renderer) -> None:
+def test_the_converged_picture_is_what_refining_ends_at(renderer):
     SCENE.fill(renderer, GRID)
     for optics in OPTICS:
         renderer.render(optics, (160, 120))
@@ -62,9 +58,7 @@ def test_the_converged_picture_is_what_refining_ends_at(renderer: Renderer) -> N
 
 
 @pytest.mark.parametrize(("optics", "is_linear"), list(zip(OPTICS[1:], (False, True))))
-def test_a_picture_drawn_in_steps_is_the_one_drawn_at_once(
-    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch, optics: Optics, is_linear: bool
-) -> None:
+def test_a_picture_drawn_in_steps_is_the_one_drawn_at_once(renderer, gl, monkeypatch, optics, is_linear):
     SCENE.fill(renderer, GRID)
     settings = RenderSettings(optics, (192, 96), is_linear=is_linear)
     monkeypatch.setattr(gl, "max_texture_size", 160)
@@ -81,9 +75,7 @@ def test_a_picture_drawn_in_steps_is_the_one_drawn_at_once(
     np.testing.assert_array_equal(drawing.image, at_once)
 
 
-def test_the_picture_on_the_screen_is_drawn_between_the_steps(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_picture_on_the_screen_is_drawn_between_the_steps(renderer, monkeypatch):
     """Dragging while a picture is saved: neither disturbs the other."""
     SCENE.fill(renderer, GRID)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
@@ -105,13 +97,12 @@ def test_the_picture_on_the_screen_is_drawn_between_the_steps(
 
 
 @pytest.mark.parametrize("is_stopped", [False, True])
-def test_another_field_changes_nothing_in_a_picture_that_is_being_drawn(renderer: Renderer, is_stopped: bool) -> None:
+def test_another_field_changes_nothing_in_a_picture_that_is_being_drawn(renderer, is_stopped):
     """It holds the arrays that it is drawn from, until it is stopped."""
     SCENE.fill(renderer, GRID)
     settings = RenderSettings(Optics(aperture_diameter=4.0), (160, 120))
     drawing, field = renderer.start_picture(settings), renderer.field
     drawing.advance(budget_s=0.0)
-    assert field is not None
     assert field.is_shared
     if is_stopped:
         for _ in range(2):

@@ -1,16 +1,12 @@
 """Shader files: all compile, includes come once, errors name the real place, uniforms are checked by name."""
 
-from __future__ import annotations
-
 import itertools
 import re
-from pathlib import Path
 
 import pytest
 
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import ShaderError, flatten
-from viewer.gpu.context import GLContext
 from viewer.gpu.programs import Program
 
 VERTEX = "#version 330 core\nuniform vec4 part;\nvoid main() { gl_Position = part; }\n"
@@ -19,7 +15,7 @@ INCLUDING = '#version 330 core\n#include "part_a.glsl"\nout vec4 color;\nvoid ma
 
 
 @pytest.mark.parametrize("fragment", FRAGMENTS)
-def test_every_shader_compiles_with_every_switch(gl: GLContext, fragment: str) -> None:
+def test_every_shader_compiles_with_every_switch(gl, fragment):
     text = flatten(resource_folder("shaders") / fragment).text
     switches = sorted(set(re.findall(r"(?:^#ifn?def |\bdefined\()(\w+)", text, re.MULTILINE)))
     pairs = [(one, other) for one, other in itertools.combinations(switches, 2)]
@@ -27,7 +23,7 @@ def test_every_shader_compiles_with_every_switch(gl: GLContext, fragment: str) -
         Program(gl.ctx, fragment, chosen).release()
 
 
-def write(folder: Path, **files: str) -> Path:
+def write(folder, **files):
     (folder / "include").mkdir()
     for name, text in files.items():
         path = folder / "include" / f"{name}.glsl" if name.startswith("part") else folder / f"{name}.frag"
@@ -44,13 +40,13 @@ def write(folder: Path, **files: str) -> Path:
         ('#version 330 core\n#include "absent.glsl"\n', "", r"pass_\.frag:2: no such include: absent\.glsl"),
     ],
 )
-def test_errors_name_file_and_line(gl: GLContext, tmp_path: Path, source: str, part_a: str, place: str) -> None:
+def test_errors_name_file_and_line(gl, tmp_path, source, part_a, place):
     folder = write(tmp_path, pass_=source, part_a=part_a)
     with pytest.raises(ShaderError, match=rf"\A{place}"):
         Program(gl.ctx, "pass_.frag", ("A", "B"), folder)
 
 
-def test_unused_uniform_is_skipped_and_misspelt_one_raises(gl: GLContext, tmp_path: Path) -> None:
+def test_unused_uniform_is_skipped_and_misspelt_one_raises(gl, tmp_path):
     source = (
         "#version 330 core\nuniform float used, unused; // uniform float commented;\nout vec4 color;\n"
         "void main() { color = vec4(used); }\n"

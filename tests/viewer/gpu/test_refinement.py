@@ -1,7 +1,5 @@
 """A picture drawn in a hurry becomes better while it stands still, and ends at one result."""
 
-from __future__ import annotations
-
 import gc
 
 import moderngl
@@ -12,8 +10,6 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.beyond.picture_quality import EDGE_PASSES, MAX_SOURCES
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, psnr
-from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=0.0, radius_px=25.0)
@@ -21,7 +17,7 @@ SIZE = SCENE.width, SCENE.height
 WIDE = Optics(aperture_diameter=4.0)
 
 
-def converged(renderer: Renderer, optics: Optics) -> np.ndarray:
+def converged(renderer, optics):
     renderer.render(optics, SIZE)
     renderer.refine()
     return renderer.read_image()
@@ -30,9 +26,7 @@ def converged(renderer: Renderer, optics: Optics) -> np.ndarray:
 @pytest.mark.parametrize(
     "optics", [WIDE, Optics(ViewOffset(0.5, 0.3), aperture_diameter=3.0)], ids=["stored", "between"]
 )
-def test_a_hurried_picture_is_refined_in_small_steps_to_the_one_drawn_at_once(
-    renderer: Renderer, optics: Optics
-) -> None:
+def test_a_hurried_picture_is_refined_in_small_steps_to_the_one_drawn_at_once(renderer, optics):
     SCENE.fill(renderer, GRID)
     at_once = converged(renderer, optics)
     renderer.render_in_time(optics, SIZE, 1e-6)
@@ -45,7 +39,7 @@ def test_a_hurried_picture_is_refined_in_small_steps_to_the_one_drawn_at_once(
     assert np.abs(renderer.read_image().astype(int) - at_once).max() <= 1
 
 
-def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Renderer) -> None:
+def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer):
     """A hard edge between two colours takes colours in between, as in a finely sampled picture."""
     scene = TwoPlanes(contrast=0.0)
     scene.fill(renderer, GRID)
@@ -60,7 +54,7 @@ def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Re
     assert np.abs(renderer.read_image().astype(int) - scene.view(ViewOffset(1.0, -2.0))[0]).max() <= 1
 
 
-def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Renderer) -> None:
+def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer):
     ctx = renderer.ctx
     ctx.gc_mode = "context_gc"  # what is dropped without being released is kept in a list
     for k in range(8):
@@ -74,7 +68,7 @@ def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Ren
     ctx.gc_mode = None
 
 
-def test_views_too_large_for_the_driver_leave_the_old_field(renderer: Renderer, gl: GLContext) -> None:
+def test_views_too_large_for_the_driver_leave_the_old_field(renderer, gl):
     SCENE.fill(renderer, GRID)
     before = converged(renderer, WIDE)
     with pytest.raises(InputError, match=r"px exceed"):
@@ -83,7 +77,7 @@ def test_views_too_large_for_the_driver_leave_the_old_field(renderer: Renderer, 
 
 
 @pytest.mark.parametrize("optics", [WIDE, Optics()], ids=("open", "pinhole"))
-def test_a_draft_is_never_reported_as_final(renderer: Renderer, optics: Optics) -> None:
+def test_a_draft_is_never_reported_as_final(renderer, optics):
     """A pinhole needs one sample: the smaller picture of a moment without time has that many, too."""
     SCENE.fill(renderer, GRID)
     for _ in range(3):

@@ -1,21 +1,17 @@
 """The digest of a frame of ImGui: it is drawn again only when the digest changes."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import pytest
 from imgui_bundle import imgui
 
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.context import create_headless
-from viewer.model.layout import Layout, layout_of
+from viewer.model.layout import layout_of
 from viewer.ui.host import UiHost
 from viewer.ui.style import Look
 
 
 @pytest.fixture
-def host() -> Iterator[UiHost]:
+def host():
     gl = create_headless()
     host = UiHost(Look())
     yield host
@@ -23,7 +19,7 @@ def host() -> Iterator[UiHost]:
     gl.release()
 
 
-def digest(host: UiHost, layout: Layout, last_corner: int) -> bytes:
+def digest(host, layout, last_corner):
     """The digest of a frame with two triangles that share an edge; the very last index is given."""
     host.begin(layout, Look())
     lines = imgui.get_background_draw_list()
@@ -35,7 +31,7 @@ def digest(host: UiHost, layout: Layout, last_corner: int) -> bytes:
     return host.end()
 
 
-def test_the_last_index_counts(host: UiHost) -> None:
+def test_the_last_index_counts(host):
     layout = layout_of(ScreenSize(640, 480), None)
     assert digest(host, layout, 3) == digest(host, layout, 3)
     assert digest(host, layout, 3) != digest(host, layout, 1)

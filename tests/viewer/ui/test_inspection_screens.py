@@ -1,25 +1,24 @@
 """What inspection draws, without a window: seen where it belongs, in both themes, at every size of text."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.scenes.rect import Rect
+from iibr_core.depth.editing.edits import Stroke
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import HEIGHT, NEAR, WIDTH, headless_with_scene
+from tests.viewer.conftest import HEIGHT, NEAR, WIDTH
+from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import MASK_COLORS
-from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, lens, messages
-from viewer.model.action import Action, do
+from viewer.model import depth, inspection, lens, messages
+from viewer.model.action import do
 from viewer.model.inspection import beside_of, sheet_cells
-from viewer.model.layout import Layout, layout_of
+from viewer.model.layout import layout_of
 from viewer.model.state.app_state import Hover
-from viewer.model.state.inspection import OVERLAYS, OverlayKind
+from viewer.model.state.depth import Brush, DepthSample
+from viewer.model.state.inspection import OVERLAYS
 from viewer.model.state.notices import Notice
 
 SIZE = 640, 1000
@@ -28,30 +27,26 @@ ENOUGH_PIXELS = 60
 HOVER = Hover(48.0, 32.0, 1.0)
 
 
-@pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
-    with headless_with_scene(tmp_path_factory.mktemp("screens"), "inspect") as viewer:
-        yield viewer
+OPEN_SECTIONS = ("inspect",)
 
 
-def layout_now(viewer: OffscreenScene, size: tuple[int, int] = SIZE) -> Layout:
+def layout_now(viewer, size=SIZE):
     scale = viewer.state.preferences.font_scale
     return layout_of(size, (WIDTH, HEIGHT), ui_scale=scale, beside=beside_of(viewer.state))
 
 
-def changed_after(viewer: OffscreenScene, *actions: Action) -> np.ndarray:
+def changed_after(viewer, *actions):
     before = viewer.screen(SIZE).astype(int)
     viewer.do(*actions)
     return np.abs(viewer.screen(SIZE) - before).max(axis=2) > 8
 
 
-def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
-    assert rect is not None
+def part(screen, rect):
     top, left = round(rect.y), round(rect.x)
     return screen[top : top + round(rect.height), left : left + round(rect.width)]
 
 
-def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: OffscreenScene) -> None:
+def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer):
     viewer.do(do(inspection.set_hover, replace(HOVER, disparity=None)), do(inspection.show_epis, True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     across, down = part(screen, layout.strip_across), part(screen, layout.strip_down)
@@ -70,10 +65,9 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Offscree
 
 
 @pytest.mark.parametrize("kind", OVERLAYS)
-def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: OffscreenScene, kind: OverlayKind) -> None:
+def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer, kind):
     viewer.do(do(lens.move_eye, ViewOffset(0, 1)))
     picture = layout_now(viewer).picture
-    assert picture is not None
     plain = part(viewer.screen(SIZE), picture).astype(int)
     viewer.do(do(inspection.set_overlay, kind), do(inspection.set_opacity, 0.0))
     clear = part(viewer.screen(SIZE), picture).astype(int)
@@ -93,9 +87,7 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: Offscreen
 
 
 @pytest.mark.parametrize(("is_guessed", "rows"), [(False, np.s_[:40]), (True, np.s_[36:76])])
-def test_the_legend_marks_the_value_under_the_pointer_below_the_badge_of_guessed_depth(
-    viewer: OffscreenScene, is_guessed: bool, rows: slice
-) -> None:
+def test_the_legend_marks_the_value_under_the_pointer_below_the_badge_of_guessed_depth(viewer, is_guessed, rows):
     viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_hover, HOVER))
     origin = DepthOrigin("rough", "guessed") if is_guessed else None
     viewer.state = replace(viewer.state, scene=replace(viewer.scene, depth_origin=origin))
@@ -104,7 +96,7 @@ def test_the_legend_marks_the_value_under_the_pointer_below_the_badge_of_guessed
     assert 10 < legend[rows].sum() == legend.sum() < 800
 
 
-def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene) -> None:
+def test_photo_and_result_on_the_two_sides_of_the_divider(viewer):
     viewer.do(do(lens.move_eye, ViewOffset(0, 1)))
     result = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
     viewer.do(do(inspection.compare, "photo"), do(inspection.move_divider, 0.5))
@@ -118,10 +110,9 @@ def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene
     assert np.abs(compared[left] - result[left]).mean() > 2 * np.abs(compared[left] - photo[left]).mean()
 
 
-def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: OffscreenScene) -> None:
+def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer):
     viewer.do(do(inspection.show_views, True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
-    assert layout.picture is not None
     for cell in sheet_cells(layout.picture, GRID):
         assert part(screen, cell).std() > 5
     changed = changed_after(viewer, do(lens.move_eye, ViewOffset(-1, -1)))
@@ -129,19 +120,18 @@ def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: OffscreenS
     assert sorted(np.flatnonzero(frames)) == [0, 4]
 
 
-def test_the_status_line_is_not_covered_by_notices(viewer: OffscreenScene) -> None:
+def test_the_status_line_is_not_covered_by_notices(viewer):
     viewer.do(do(inspection.show_values, True), do(inspection.set_hover, HOVER))
     line = part(viewer.screen(SIZE), layout_now(viewer).status)
     assert line.std() > 5
     probe = viewer.state.inspection.probe
-    assert probe is not None
     assert probe.origin == "photo"
     assert probe.rgb[0] > probe.rgb[1] == probe.rgb[2], "the red square"
     viewer.do(do(messages.notify, Notice("a notice")))
     np.testing.assert_array_equal(part(viewer.screen(SIZE), layout_now(viewer).status), line)
 
 
-def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: OffscreenScene) -> None:
+def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer):
     """Beside the square, in the middle row, from an eye that looks behind it."""
     viewer.do(do(inspection.show_values, True), do(lens.move_eye, ViewOffset(0, 1)))
     origins = set()
@@ -149,6 +139,43 @@ def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: OffscreenScen
         disparity = viewer.pick(x, HEIGHT / 2)
         viewer.do(do(inspection.set_hover, Hover(x, HEIGHT / 2, disparity)))
         viewer.screen((400, 300))
-        assert viewer.state.inspection.probe is not None
         origins.add(viewer.state.inspection.probe.origin)
     assert origins == {"generated", "inpainted"}
+
+
+def ring_after(viewer, *actions):
+    """Return the middle and the size (down, across) of what appears over the picture, in pixels of the photo."""
+    layout = layout_now(viewer)
+    ring = np.argwhere(part(changed_after(viewer, *actions), layout.picture)) / layout.picture.width * WIDTH
+    return (ring.min(axis=0) + ring.max(axis=0)) / 2, np.ptp(ring, axis=0)
+
+
+def test_the_brush_has_a_ring_of_its_size_under_the_pointer(viewer):
+    viewer.do(do(inspection.set_hover, Hover(48.0, 20.0, 1.5)), do(depth.set_brush, Brush(radius=0.1, is_on=True)))
+    middle, size = ring_after(viewer, do(depth.set_brush, Brush(radius=0.15, is_on=True)))
+    np.testing.assert_allclose(middle, (20.5, 48.5), atol=0.7)
+    np.testing.assert_allclose(size, 2 * 0.15 * WIDTH, atol=1.0)
+
+
+@pytest.mark.parametrize("eye", [CENTRE, ViewOffset(0.6, -0.8)])
+def test_the_ring_of_a_picked_depth_stays_on_its_surface(viewer, eye):
+    """The place in the middle of the scene is picked: a surface that moves by 20 px a view step."""
+    viewer.do(do(lens.move_eye, eye), do(depth.set_brush, Brush(tool="level", is_on=True)))
+    picked = Brush(tool="level", is_on=True, sample=DepthSample((0.5, 0.5), 20.0))
+    middle, _ = ring_after(viewer, do(depth.set_brush, picked))
+    np.testing.assert_allclose(middle, (HEIGHT / 2 - 20 * eye.t, WIDTH / 2 - 20 * eye.s), atol=0.5)
+
+
+def test_a_stroke_under_way_is_seen_in_colours(viewer):
+    """Where it is painted, and nowhere else."""
+    viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
+    preview, before = DepthPreview(viewer.view), viewer.screen(SIZE).astype(int)
+    for stroke in (Stroke("farther", ((0.5, 0.5),), 0.1, 1.0), None):
+        viewer.state = replace(viewer.state, stroke=stroke)
+        preview.update(viewer.state)
+        changed = part(np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24, layout_now(viewer).picture)
+        rows, columns = np.nonzero(changed)
+        assert (rows.size > 200) == (stroke is not None)
+        if stroke is not None:
+            height, width = changed.shape
+            assert np.hypot((columns - width / 2) / width, (rows - height / 2) / width).max() < 0.12

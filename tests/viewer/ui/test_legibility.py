@@ -1,11 +1,7 @@
 """The panel's text from 60 % to 200 %: nothing cut or covered, contrast of 4.5 : 1, and controls that stay in place."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import pytest
 from imgui_bundle import imgui
@@ -14,76 +10,31 @@ from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
-from tests.viewer.conftest import headless_with_scene
-from tests.viewer.ui.watched_widgets import watch_widgets
+from tests.viewer.ui.conftest import WORDS_INSIDE
 from viewer.background.depth_models import list_models
-from viewer.display.offscreen import OffscreenScene
 from viewer.model import depth, depth_models, inspection, lens, messages, preferences, viewpoint
-from viewer.model.action import Action, do
+from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
-from viewer.model.state.preferences import SECTIONS, Theme, Units
-from viewer.model.state.prompts import ExportPrompt, JobProgress, Listing, PalettePrompt, PathPrompt, Prompt, SavePrompt
-from viewer.ui.style import Color, Look, apply_style, palette_of
+from viewer.model.state.preferences import SECTIONS
+from viewer.model.state.prompts import ExportPrompt, JobProgress, Listing, PalettePrompt, PathPrompt, SavePrompt
+from viewer.ui.style import Look, apply_style, palette_of
 
 WINDOW, SMALL_WINDOW = ScreenSize(1280, 800), ScreenSize(400, 300)
 MIN_CONTRAST = 4.5
 MIN_HOVER_CONTRAST = 1.5
 SCALES = (0.6, 1.0, 2.0)
 SLACK_PX = 1.0
-WORDS_INSIDE = ("button", "small_button", "slider_float", "slider_int", "begin_combo")
 WIDGETS = (*WORDS_INSIDE, "text", "text_disabled", "checkbox", "tree_node_ex")
-
-
-@dataclass(frozen=True)
-class Item:
-    """A widget as it was laid out. words: drawn in it, on one line."""
-
-    kind: str
-    words: str
-    left: float
-    top: float
-    right: float
-    bottom: float
-    words_width: float
-
-
-def words_of(kind: str, arguments: tuple[Any, ...]) -> str:
-    if kind in ("slider_float", "slider_int"):
-        value, form = arguments[1], arguments[4] if len(arguments) > 4 else "%d"
-        return str(form % value if form.replace("%%", "").count("%") else form.replace("%%", "%"))
-    return str(arguments[1] if kind == "begin_combo" else arguments[0]).partition("##")[0]
-
-
-@pytest.fixture
-def items(monkeypatch: pytest.MonkeyPatch) -> list[Item]:
-    """Every widget that is built from now on, in windows of whatever name; the real ones, watched."""
-    found: list[Item] = []
-
-    def record(kind: str, arguments: tuple[Any, ...]) -> None:
-        words = words_of(kind, arguments)
-        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-        width = imgui.calc_text_size(words).x
-        found.append(Item(kind, words, low.x, low.y, high.x, high.y, width))
-
-    watch_widgets(monkeypatch, WIDGETS, found, record)
-    return found
-
-
-@pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
-    with headless_with_scene(tmp_path_factory.mktemp("legible"), *SECTIONS) as viewer:
-        yield viewer
+OPEN_SECTIONS = SECTIONS
 
 
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("units", ["photographic", "light field"])
-def test_no_widget_is_cut_and_none_lies_over_another(
-    viewer: OffscreenScene, items: list[Item], scale: float, units: Units
-) -> None:
+def test_no_widget_is_cut_and_none_lies_over_another(viewer, built, scale, units):
     optics = (do(lens.set_aperture, 2.3), do(lens.set_focus_range, 0.7), do(lens.set_focus_tilt, (0.3, -0.2)))
     kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
     viewer.do(
@@ -95,6 +46,7 @@ def test_no_widget_is_cut_and_none_lies_over_another(
     left = 120  # room for a small picture: it is not what is looked at
     right = left + PANEL_WIDTH * scale
     viewer.screen(ScreenSize(round(right), 2600))
+    items = [item for item in built if item.kind in WIDGETS and item.window == "panel"]
     assert len(items) > 40
     for item in items:
         assert left - SLACK_PX <= item.left, f"{item} begins outside"
@@ -107,7 +59,7 @@ def test_no_widget_is_cut_and_none_lies_over_another(
         assert min(across, down) <= SLACK_PX, f"{one} lies over {other}"
 
 
-PROMPTS: dict[str, Prompt] = {
+PROMPTS = {
     "help": "help",
     "about": "about",
     "quit": "quit",
@@ -125,13 +77,11 @@ RECENT = "/photos/a.jpg", "/photos/one with a long name that does not fit into o
 
 @pytest.mark.parametrize("scale", [0.6, 2.0])
 @pytest.mark.parametrize("name", [*PROMPTS, WELCOME, SMALL])
-def test_prompts_fit_the_window_and_their_words_fit_them(
-    viewer: OffscreenScene, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
-) -> None:
-    ended: list[tuple[float, ...]] = []
+def test_prompts_fit_the_window_and_their_words_fit_them(viewer, built, monkeypatch, name, scale):
+    ended = []
     end = imgui.end
 
-    def note_and_end() -> None:
+    def note_and_end():
         corner, size = imgui.get_window_pos(), imgui.get_window_size()
         if imgui.internal.get_current_window_read().name.startswith(("prompt", WELCOME)):
             ended.append((corner.x, corner.y, corner.x + size.x, corner.y + size.y, imgui.get_scroll_max_x()))
@@ -154,16 +104,16 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
     left, top, right, bottom, hidden = ended[-1]
     assert (left >= 0, top >= 0, right <= window.width, bottom <= window.height) == (True,) * 4, ended[-1]
     assert hidden == 0, "cut at the right"
-    within = [item for item in items if left <= item.left < right and top <= item.top < bottom]
+    within = [item for item in built if left <= item.left < right and top <= item.top < bottom]
     assert within
     for item in within:
         assert item.kind not in WORDS_INSIDE or item.words_width <= item.right - item.left + SLACK_PX, item
 
 
-def contrast(one: Color, other: Color) -> float:
+def contrast(one, other):
     """Of two sRGB colours, as the Web Content Accessibility Guidelines have it: 1 to 21."""
 
-    def light(color: Color) -> float:
+    def light(color):
         linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in color[:3]]
         return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
@@ -172,7 +122,7 @@ def contrast(one: Color, other: Color) -> float:
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-def test_words_stand_out_from_what_they_stand_on(theme: Theme) -> None:
+def test_words_stand_out_from_what_they_stand_on(theme):
     palette = palette_of(theme)
     assert contrast((0, 0, 0, 1), (1, 1, 1, 1)) == pytest.approx(21)
     pairs = {
@@ -191,7 +141,7 @@ def test_words_stand_out_from_what_they_stand_on(theme: Theme) -> None:
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> None:
+def test_an_entry_under_the_pointer_stands_out_from_its_list(theme):
     context = imgui.create_context()
     try:
         apply_style(Look(theme=theme))
@@ -205,7 +155,7 @@ def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> No
 MASK = ApertureMask("star.png", 1, 1, b"\xff")
 GLOSSY = do(lens.set_gloss, FIRST_GLOSS)
 TALL = ScreenSize(900, 2600)
-SWITCHES: dict[str, tuple[Action, ...]] = {
+SWITCHES = {
     "loop": (do(viewpoint.set_loop, "circle"),),
     "tilt": (do(lens.show_tilt_handles, True),),
     **{kind: (do(lens.set_aperture_shape, ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
@@ -226,25 +176,16 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
 }
 
 
-@pytest.fixture
-def tops(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float]]:
-    """The words of each label, button and box of the panel, and the place of its upper border."""
-    found: list[tuple[str, float]] = []
-
-    def record(kind: str, arguments: tuple[Any, ...]) -> None:
-        found.append((arguments[0], imgui.get_item_rect_min().y))
-
-    watch_widgets(monkeypatch, ("text", "button", "checkbox", "invisible_button"), found, record)
-    return found
-
-
 @pytest.mark.parametrize("name", SWITCHES)
-def test_what_is_switched_on_moves_nothing(viewer: OffscreenScene, tops: list[tuple[str, float]], name: str) -> None:
-    viewer.screen(TALL)
-    before = dict(tops)
+def test_what_is_switched_on_moves_nothing(viewer, built, name):
+    def tops():
+        viewer.screen(TALL)
+        kinds = ("text", "button", "checkbox", "invisible_button")
+        return {item.name: item.top for item in built if item.kind in kinds and item.window == "panel"}
+
+    before = tops()
     assert len(before) > 40
     viewer.do(*SWITCHES[name])
-    viewer.screen(TALL)
-    after = dict(tops)
+    after = tops()
     assert {words: top for words, top in before.items() if words in after and after[words] != top} == {}
     assert "Size" in after, "the last section was built"
