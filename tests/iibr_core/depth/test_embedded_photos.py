@@ -1,5 +1,4 @@
 import base64
-import io
 import json
 import zipfile
 from pathlib import Path
@@ -7,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image, ImageFilter
-from PIL.PngImagePlugin import PngInfo
 
 from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
@@ -16,6 +14,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.types import InputError
 from tests.iibr_core import embedded_files as files
+from tests.iibr_core.pictures import with_xmp
 
 PIXELS, DEPTH = files.disc_scene()
 PHOTO = files.picture(PIXELS)
@@ -51,10 +50,7 @@ def test_a_senseless_range_is_told_and_dark_is_near(tmp_path, kind, near, far) -
 @pytest.mark.parametrize("kind", ["PNG", "WEBP", "AVIF"])
 def test_gdepth_in_other_kinds_of_files(tmp_path, kind) -> None:
     xmp = files.gdepth_segments(files.picture(255 - SMALL, "PNG"))[0].removeprefix(files.STANDARD)
-    file, info = io.BytesIO(), PngInfo()
-    info.add_itxt("XML:com.adobe.xmp", xmp.decode())
-    Image.fromarray(PIXELS).save(file, kind, **({"pnginfo": info} if kind == "PNG" else {"xmp": xmp}))
-    assert_disc_is_nearest(opened(tmp_path, f"a.{kind.lower()}", file.getvalue()))
+    assert_disc_is_nearest(opened(tmp_path, f"a.{kind.lower()}", with_xmp(Image.fromarray(PIXELS), kind, xmp)))
 
 
 # ---- phones' trailers

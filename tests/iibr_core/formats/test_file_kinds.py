@@ -1,19 +1,16 @@
 import shutil
 import struct
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
-import pillow_heif
 import pytest
 from PIL import Image
-from PIL.PngImagePlugin import PngInfo
 
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import InputError
+from tests.iibr_core.embedded_files import GIMAGE, packet
+from tests.iibr_core.pictures import as_bytes, with_xmp, write_oiio
 
 PIXELS = np.dstack(np.broadcast_arrays(np.arange(48)[:, None] * 5, 40 + np.arange(64) * 3, 90)).astype(np.uint8)
 PICTURE = Image.fromarray(PIXELS)
@@ -62,15 +59,12 @@ def test_a_raw_file_is_refused_though_its_preview_can_be_read(tmp_path) -> None:
     assert read_photo(tmp_path / "jpeg.dng").size == (48, 64)
 
 
-WRONG_ENDINGS = {"png.jpg": "PNG", "avif.jpg": "AVIF", "jpeg.heic": "JPEG", "noending": "JPEG"}
-
-
-@pytest.mark.parametrize("name", [*WRONG_ENDINGS, "heic.jpg"])
-def test_pictures_open_whatever_their_ending(tmp_path, name) -> None:
-    if name == "heic.jpg":
-        pillow_heif.from_pillow(PICTURE).save(tmp_path / name, quality=95)
-    else:
-        PICTURE.save(tmp_path / name, WRONG_ENDINGS[name])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("png.jpg", "PNG"), ("avif.jpg", "AVIF"), ("heic.jpg", "HEIC"), ("jpeg.heic", "JPEG"), ("noending", "JPEG")],
+)
+def test_pictures_open_whatever_their_ending(tmp_path, name, kind) -> None:
+    (tmp_path / name).write_bytes(as_bytes(PICTURE, kind))
     photo = read_photo(tmp_path / name)
     assert np.abs(255 * photo.pixels - PIXELS).mean() < 4
     assert photo.notes == ()
@@ -80,10 +74,7 @@ def test_pictures_open_whatever_their_ending(tmp_path, name) -> None:
 def test_other_kinds_of_pictures_open(tmp_path, ending) -> None:
     path = tmp_path / f"a.{ending}"
     if ending == "jxl":
-        output = oiio.ImageOutput.create(str(path))
-        assert output.open(str(path), oiio.ImageSpec(64, 48, 3, "uint8")), output.geterror()
-        assert output.write_image(PIXELS)
-        output.close()
+        write_oiio(path, PIXELS)
     elif ending == "psd":
         # Version 1, 3 channels of 8 bits, RGB, no layers; the picture itself is not packed.
         head = b"8BPS\0\x01" + bytes(6) + struct.pack(">HIIHH", 3, 48, 64, 8, 3)
@@ -114,19 +105,10 @@ def test_pictures_of_other_colours_open(tmp_path, name, mode, note) -> None:
 AGAIN, ELSEWHERE = "get the whole file again", "if another program opens it, save it there as JPEG, PNG or TIFF"
 
 
-def as_bytes(kind: str) -> bytes:
-    stored = BytesIO()
-    if kind == "HEIC":
-        pillow_heif.from_pillow(PICTURE).save(stored)
-    else:
-        PICTURE.save(stored, kind)
-    return stored.getvalue()
-
-
 def with_compression(code: int) -> bytes:
     """Return a TIFF that states another compression: tag 259, one short number."""
     head = struct.pack("<HHI", 259, 3, 1)
-    return as_bytes("TIFF").replace(head + struct.pack("<I", 1), head + struct.pack("<I", code))
+    return as_bytes(PICTURE, "TIFF").replace(head + struct.pack("<I", 1), head + struct.pack("<I", code))
 
 
 @pytest.mark.parametrize(
@@ -134,9 +116,9 @@ def with_compression(code: int) -> bytes:
     [
         ("lerc.tif", with_compression(34887)),
         ("jpeg_xl.tif", with_compression(50002)),
-        ("twelve_bits.jpg", as_bytes("JPEG").replace(b"\xff\xc0\0\x11\x08", b"\xff\xc1\0\x11\x0c")),
-        ("lossless.jpg", as_bytes("JPEG").replace(b"\xff\xc0\0\x11", b"\xff\xc3\0\x11")),
-        ("vvc.heic", as_bytes("HEIC").replace(b"hvc1", b"vvc1")),
+        ("twelve_bits.jpg", as_bytes(PICTURE, "JPEG").replace(b"\xff\xc0\0\x11\x08", b"\xff\xc1\0\x11\x0c")),
+        ("lossless.jpg", as_bytes(PICTURE, "JPEG").replace(b"\xff\xc0\0\x11", b"\xff\xc3\0\x11")),
+        ("vvc.heic", as_bytes(PICTURE, "HEIC").replace(b"hvc1", b"vvc1")),
     ],
 )
 def test_whole_files_of_unread_kinds_are_not_called_damaged(tmp_path, name, content) -> None:
@@ -147,61 +129,38 @@ def test_whole_files_of_unread_kinds_are_not_called_damaged(tmp_path, name, cont
 
 
 @pytest.mark.parametrize("kind", ["JPEG", "PNG", "TIFF", "WEBP", "AVIF", "HEIC"])
-@pytest.mark.parametrize("share", [0.2, 0.8])
+@pytest.mark.parametrize("share", [0.01, 0.2, 0.8])
 def test_cut_files_are_to_be_fetched_again(tmp_path, kind, share) -> None:
-    path, stored = tmp_path / f"a.{kind.lower()}", as_bytes(kind)
-    path.write_bytes(stored[: int(share * len(stored))])
-    with pytest.raises(InputError, match=AGAIN):
-        read_photo(path)
+    """Also where rows are read and made smaller one after the other."""
+    path, stored = tmp_path / f"a.{kind.lower()}", as_bytes(PICTURE, kind)
+    path.write_bytes(stored[: max(int(share * len(stored)), 16)])
+    for most in (1000, 2_000_000):
+        with pytest.raises(InputError, match=AGAIN) as caught:
+            read_photo(path, most)
+        assert str(caught.value).count(path.name) == 1
 
 
-XMP_TAG = 700
 GPANO = "http://ns.google.com/photos/1.0/panorama/"
-GIMAGE = "http://ns.google.com/photos/1.0/image/"
 
 
-def xmp(attributes: str = "") -> str:
-    return (
-        '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">'
-        f'<rdf:Description rdf:about="" xmlns:GPano="{GPANO}" xmlns:GImage="{GIMAGE}" {attributes}>'
-        "</rdf:Description></rdf:RDF></x:xmpmeta>"
-    )
+FLAT = "Panorama (equirectangular): shown flat, as if it were an ordinary photo, so straight lines look bent."
+RIGHT_EYE = "The right eye's picture in it (Cardboard Camera, VR180) is not used."
 
 
-def save(path: Path, packet: str) -> Path:
-    if path.suffix == ".png":
-        info = PngInfo()
-        info.add_itxt("XML:com.adobe.xmp", packet)
-        PICTURE.save(path, pnginfo=info)
-    elif path.suffix == ".tif":
-        PICTURE.save(path, tiffinfo={XMP_TAG: packet.encode()})
-    elif path.suffix == ".heic":
-        file = pillow_heif.from_pillow(PICTURE)
-        file.info["xmp"] = packet.encode()
-        file.save(path, quality=90)
-    else:
-        PICTURE.save(path, xmp=packet.encode())
-    return path
-
-
-@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.heic"])
-def test_panoramas_are_shown_flat_with_a_note(tmp_path, name) -> None:
-    photo = read_photo(save(tmp_path / name, xmp('GPano:ProjectionType="equirectangular"')))
-    assert photo.size == (48, 64)
-    note = "Panorama (equirectangular): shown flat, as if it were an ordinary photo, so straight lines look bent."
-    assert photo.notes == (note,)
-
-
-@pytest.mark.parametrize("packet", [xmp(), xmp('GPano:SourcePhotosCount="1"'), f"<broken {GPANO}", ""])
-def test_other_photos_have_no_notes(tmp_path, packet) -> None:
-    assert file_notes(save(tmp_path / "a.jpg", packet)) == ()
-
-
-def test_a_right_eye_that_is_not_used_is_named(tmp_path) -> None:
-    packet = xmp('GPano:FullPanoWidthPixels="8192" GImage:Mime="image/jpeg"')
-    panorama, right_eye = file_notes(save(tmp_path / "a.vr.jpg", packet))
-    assert panorama.startswith("Panorama")
-    assert right_eye == "The right eye's picture in it (Cardboard Camera, VR180) is not used."
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "TIFF", "HEIC"])
+def test_panoramas_are_shown_flat_with_a_note(tmp_path, kind) -> None:
+    """A right eye that is not used is named; other photos have no notes."""
+    path = tmp_path / "a.jpg"
+    path.write_bytes(with_xmp(PICTURE, kind, packet({f"{GPANO} ProjectionType": "equirectangular"})))
+    photo = read_photo(path)
+    assert (photo.size, photo.notes) == ((48, 64), (FLAT,))
+    stereo = {f"{GPANO} FullPanoWidthPixels": "8192", f"{GIMAGE} Mime": "image/jpeg"}
+    path.write_bytes(with_xmp(PICTURE, kind, packet(stereo)))
+    panorama, right_eye = file_notes(path)
+    assert (panorama.startswith("Panorama"), right_eye) == (True, RIGHT_EYE)
+    for other in (packet({f"{GPANO} SourcePhotosCount": "1"}), f"<broken {GPANO}".encode()):
+        path.write_bytes(with_xmp(PICTURE, kind, other))
+        assert file_notes(path) == ()
 
 
 @pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.png", "a.avif", "webp.jpg"])

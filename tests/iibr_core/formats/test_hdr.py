@@ -3,7 +3,6 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 import pillow_heif
 import pytest
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from iibr_core.formats.images.hdr import KNEE, hlg_display_light, hlg_scene_ligh
 from iibr_core.formats.images.photo import read_photo, read_thumbnail
 from iibr_core.types import ImageSize
 from tests.iibr_core.formats.test_color_profile import profile_bytes
+from tests.iibr_core.pictures import write_oiio
 
 PQ, HLG = (9, 16, 0, 1), (9, 18, 0, 1)
 BT2020_FROM_SRGB = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
@@ -43,20 +43,8 @@ def chunked(png: bytes, kind: bytes, content: bytes) -> bytes:
     return png[:33] + chunk + png[33:]
 
 
-def write_oiio(path: Path, pixels: NDArray[np.uint16], kind: str = "uint16", **attributes: tuple[int, ...]) -> None:
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "uint16")
-    spec.set_format(kind)
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    for name, value in attributes.items():
-        spec.attribute(name, f"int[{len(value)}]", value)
-    output = oiio.ImageOutput.create(str(path))
-    assert output.open(str(path), spec), output.geterror()
-    assert output.write_image(pixels)
-    output.close()
-
-
 def write_png(path: Path, pixels: NDArray[np.uint16], codes: tuple[int, ...]) -> None:
-    write_oiio(path, pixels)
+    write_oiio(path, pixels, oiio__UnassociatedAlpha=1)
     path.write_bytes(chunked(path.read_bytes(), b"cICP", bytes(codes)))
 
 
