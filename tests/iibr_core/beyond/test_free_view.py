@@ -1,9 +1,10 @@
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
-from iibr_core.beyond import free_cameras, free_view
+from iibr_core.beyond import free_cameras
 from iibr_core.beyond.free_view import render_free_view, target_from_photo
 from iibr_core.beyond.landed_squares import CORNERS, SAMPLES, draw_rays, rows_landed_on
 from iibr_core.inpainting.background import fill_background
@@ -111,56 +112,31 @@ def test_wherever_it_stands_a_view_is_finite(place):
         assert np.isfinite(view.disparity).all()
 
 
-def test_bands_do_not_show(monkeypatch):
-    pixels, inverse_depth = square_scene()
-    target = camera(40, 48, place=(0.1, 0.05, 0.1), turned=about(2, 20.0))
-    whole = view_of(pixels, inverse_depth, target)
-    monkeypatch.setattr(free_view, "MAX_PIXELS_AT_ONCE", 48 * SAMPLES**2 * 3)
-    banded = view_of(pixels, inverse_depth, target)
-    np.testing.assert_array_equal(whole.colors, banded.colors)
-
-
-def test_depths_that_are_known_are_those_of_the_range():
+def test_depths_that_are_known_are_those_of_the_range_else_the_nearest_is_one_away():
     given = np.tile(np.linspace(5.0, 9.0, 50, dtype=np.float32), (40, 1))
     inverse_depth = free_cameras.inverse_depth_of(given, (2.0, 10.0))
     assert (inverse_depth.min(), inverse_depth.max()) == (pytest.approx(0.1), pytest.approx(0.5))
     steps = np.diff(inverse_depth[0, 5:-5])  # lone pixels at both ends do not count
     np.testing.assert_allclose(steps, steps[0], rtol=1e-4)
-
-
-def test_else_the_nearest_is_one_away():
     given = np.repeat(np.float32([1.0, 2.0]), 30).reshape(6, 10)
     np.testing.assert_allclose(free_cameras.inverse_depth_of(given, None), given / 2)
     below_zero = free_cameras.inverse_depth_of(2 * given - 3, None)
-    assert below_zero.max() == 1.0
-    assert below_zero.min() == pytest.approx(1 / 20, rel=1e-4)
+    assert (below_zero.min(), below_zero.max()) == (pytest.approx(1 / 20, rel=1e-4), 1.0)
+    for value, depths in product((0.0, -3.0, 1e30), (None, (2.0, 10.0))):
+        flat = free_cameras.inverse_depth_of(np.full((3, 4), value, np.float32), depths)
+        assert (flat > 0).all()
+        assert np.isfinite(flat).all()
 
 
-@pytest.mark.parametrize("depths", [None, (2.0, 10.0)])
-@pytest.mark.parametrize("value", [0.0, -3.0, 1e30])
-def test_what_is_flat_is_at_a_sensible_depth(value, depths):
-    inverse_depth = free_cameras.inverse_depth_of(np.full((3, 4), value, np.float32), depths)
-    assert (inverse_depth > 0).all()
-    assert np.isfinite(inverse_depth).all()
-
-
-def test_the_plane_is_looked_through_as_far_as_cameras_stand_beside():
+def test_rays_reach_as_far_as_cameras_stand_beside_or_turn():
     photo, beside = camera(40, 48), camera(40, 48, place=(0.2, -0.1, 0.0))
     reach = free_cameras.reach_of(photo, [photo, beside], (1.0, 3.0))
     assert reach.step == pytest.approx(0.2 / free_cameras.FARTHEST_STEPS)
     assert {(round(at.t, 6), round(at.s, 6)) for at in reach.outer} >= {(-2.0, 4.0), (-2.0, 0.0), (0.0, 4.0)}
-
-
-def test_a_camera_far_beside_asks_for_half_a_picture_of_parallax_at_most():
-    photo, beside = camera(40, 48), camera(40, 48, place=(0.9, 0.0, 0.0))
-    reach = free_cameras.reach_of(photo, [photo, beside], (1.0, 3.0))
-    # From 1 to 3 units away, a unit's move is 60 (1 - 1/3) px.
+    reach = free_cameras.reach_of(photo, [photo, camera(40, 48, place=(0.9, 0.0, 0.0))], (1.0, 3.0))
+    # From 1 to 3 units away, a unit's move is 60 (1 - 1/3) px; half a picture of parallax at most.
     assert 40 * free_cameras.FARTHEST_STEPS * reach.step == pytest.approx(free_cameras.MAX_PARALLAX * 48)
     assert max(at.s for at in reach.outer) == pytest.approx(free_cameras.FARTHEST_STEPS)
-
-
-def test_a_turned_camera_asks_for_what_lies_beyond_the_frame():
-    photo = camera(40, 48)
     margins = free_cameras.reach_of(photo, [camera(40, 48, turned=about(1, 10.0))], (1.0, 3.0)).margins
     assert margins.right >= 60 * np.tan(np.radians(10.0)) > 0 == margins.left
     wide = free_cameras.reach_of(photo, [camera(40, 48, 2.0)], (1.0, 3.0)).margins

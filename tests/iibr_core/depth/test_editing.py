@@ -66,12 +66,6 @@ def test_hard_maps_stay_finite(values, edits) -> None:
     assert np.isfinite(result).all()
 
 
-@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (2, 3)])
-def test_a_map_that_knows_nothing_is_an_error(shape) -> None:
-    with pytest.raises(InputError, match="no disparity is known"):
-        extent_of(np.full(shape, np.nan, np.float32))
-
-
 def test_the_extent_leaves_wild_values_out_and_a_flat_map_has_one_too() -> None:
     disparity = np.random.default_rng(0).uniform(-1, 1, (100, 100)).astype(np.float32)
     disparity[3, 3] = 1e6
@@ -79,6 +73,9 @@ def test_the_extent_leaves_wild_values_out_and_a_flat_map_has_one_too() -> None:
     assert -1 <= low < high <= 1
     low, high = extent_of(np.full((10, 200), 3.0, np.float32))
     assert (low, high) == (2.0, 4.0)
+    for shape in ((0, 0), (0, 5), (2, 3)):
+        with pytest.raises(InputError, match="no disparity is known"):
+            extent_of(np.full(shape, np.nan, np.float32))
 
 
 def test_levels_count_every_pixel_once() -> None:
@@ -240,9 +237,9 @@ def grey_photo(color: float = 0.4) -> np.ndarray:
     return np.full((ROWS, COLUMNS, 3), color, np.float32)
 
 
-def filled(photo, x=0.1, y=0.5, radius=0.03, disparity=None):
+def filled(photo, x=0.1, y=0.5, radius=0.03, disparity=None, **changes):
     disparity = np.zeros(photo.shape[:2], np.float32) if disparity is None else disparity
-    return surface_at(photo, disparity, Stroke("fill", ((x, y),), radius, 1.0), 0, (0.0, 1.0))
+    return surface_at(photo, disparity, Stroke("fill", ((x, y),), radius, 1.0, **changes), 0, (0.0, 1.0))
 
 
 def test_an_edge_of_the_photo_or_of_the_map_ends_it() -> None:
@@ -265,7 +262,16 @@ def test_soft_shades_are_one_until_they_turn_into_another_colour() -> None:
     assert not mask[:, COLUMNS // 2 :].any()
 
 
-def test_it_does_not_run_out_through_a_gap() -> None:
+def test_gaps_texture_and_small_holes_are_no_edges_and_large_holes_are() -> None:
+    photo = grey_photo(0.3)
+    photo[:, ::2] = 0.6
+    photo[:, 60:] = [0.1, 0.9, 0.1]
+    assert filled(photo, radius=0.1)[:, :58].all(), "texture under the brush"
+    assert not filled(photo, radius=0.1)[:, 60:].any()
+    photo = grey_photo()
+    photo[10:13, 40:43] = photo[30:45, 40:60] = 0.9
+    assert filled(photo)[:25].all(), "smaller than the brush"
+    assert not filled(photo)[32:43, 42:58].any()
     photo = grey_photo()
     photo[:, 38:42] = 0.9
     photo[30:33, 38:42] = 0.4
@@ -274,36 +280,15 @@ def test_it_does_not_run_out_through_a_gap() -> None:
     assert not mask[:, 42:].any()
 
 
-def test_texture_under_the_brush_is_no_edge() -> None:
-    photo = grey_photo(0.3)
-    photo[:, ::2] = 0.6
-    photo[:, 60:] = [0.1, 0.9, 0.1]
-    assert filled(photo, radius=0.1)[:, :58].all()
-    assert not filled(photo, radius=0.1)[:, 60:].any()
-
-
-def test_holes_smaller_than_the_brush_are_filled_and_larger_ones_are_not() -> None:
+def test_tolerance_ends_it_thin_surfaces_give_something_and_clicks_outside_nothing() -> None:
     photo = grey_photo()
-    photo[10:13, 40:43] = 0.9
-    photo[30:45, 40:60] = 0.9
-    mask = filled(photo)
-    assert mask[:25].all()
-    assert not mask[32:43, 42:58].any()
-
-
-def test_thin_surfaces_and_clicks_on_edges_give_something_and_clicks_outside_nothing() -> None:
+    photo[:, 20:] += 0.06
+    photo[:, 50:] += 0.2
+    for tolerance, columns in ((0.25, 20), (1.0, 50), (4.0, 80)):
+        mask = filled(photo, radius=0.02, tolerance=tolerance)
+        assert mask[:, : columns - 2].all()
+        assert not mask[:, columns + 2 :].any()
     photo = grey_photo()
     photo[:, 40:43] = 0.9
     assert all(filled(photo, *place).any() for place in ((0.5, 0.5), (0.51, 0.1)))
     assert not any(filled(photo, *place).any() for place in ((-0.1, 0.5), (0.5, 1.0), (1e30, 0.5)))
-
-
-@pytest.mark.parametrize(("tolerance", "columns"), [(0.25, 20), (1.0, 50), (4.0, 80)])
-def test_tolerance_is_the_contrast_that_ends_the_surface(tolerance, columns) -> None:
-    photo = grey_photo()
-    photo[:, 20:] += 0.06
-    photo[:, 50:] += 0.2
-    stroke = Stroke("fill", ((0.1, 0.5),), 0.02, 1.0, tolerance=tolerance)
-    mask = surface_at(photo, np.zeros((ROWS, COLUMNS), np.float32), stroke, 0, (0.0, 1.0))
-    assert mask[:, : columns - 2].all()
-    assert not mask[:, columns + 2 :].any()

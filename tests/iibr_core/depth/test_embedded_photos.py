@@ -130,10 +130,15 @@ def test_the_depth_of_an_avif(tmp_path, orientation, white_is_near) -> None:
     assert_disc_is_nearest(found)
 
 
-def test_an_apple_portrait_in_a_heic(tmp_path) -> None:
+def test_an_apple_portrait_in_a_heic_and_mattes_that_are_none(tmp_path) -> None:
     found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL))
     assert_disc_is_nearest(found)
     assert found.origin.words == "the photo itself (Apple portrait)"
+    kind = b"urn:com:apple:photo:2018:aux:portraiteffectsmatte"
+    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL, auxiliary=kind))
+    assert found.origin.kind == "rough"
+    words = "a.heic holds mattes (portrait effects), which are no depth maps; this is not read."
+    assert words in found.disparity.notes
 
 
 @pytest.mark.parametrize(("orientation", "quarters"), [(1, 0), (3, 2), (6, 1), (8, -1)])
@@ -141,14 +146,6 @@ def test_the_map_of_a_samsung_heic_is_turned_with_its_photo(tmp_path, orientatio
     photo, stored = (np.ascontiguousarray(np.rot90(upright, quarters)) for upright in (PIXELS, 255 - SMALL))
     data = files.samsung_jpeg(files.heic(photo, orientation=orientation), stored)
     assert_disc_is_nearest(opened(tmp_path, "a.heic", data))
-
-
-def test_mattes_of_a_heic_are_named_and_not_taken_for_depth(tmp_path) -> None:
-    kind = b"urn:com:apple:photo:2018:aux:portraiteffectsmatte"
-    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL, auxiliary=kind))
-    assert found.origin.kind == "rough"
-    words = "a.heic holds mattes (portrait effects), which are no depth maps; this is not read."
-    assert words in found.disparity.notes
 
 
 # ---- what is not read
@@ -247,15 +244,12 @@ def test_a_processed_lytro_file_opens_with_its_depth(tmp_path, name, is_illum) -
     np.testing.assert_allclose(read_photo(tmp_path / name).pixels * 255, PIXELS, atol=1)
 
 
-@pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])
-def test_cut_lytro_files_are_to_be_fetched_again(tmp_path, cut) -> None:
+def test_cut_lytro_files_are_to_be_fetched_again_and_unknown_ones_exported(tmp_path) -> None:
     data = stack(True)
-    (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
-    with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: cut off at [^\n]*; get the whole file again$"):
-        read_photo(tmp_path / "a.lfp")
-
-
-def test_lytro_files_of_an_unknown_version_are_to_be_exported(tmp_path) -> None:
+    for cut in (0.1, 0.5, 0.95):
+        (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
+        with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: cut off at [^\n]*; get the whole file again$"):
+            read_photo(tmp_path / "a.lfp")
     entry = {"imageArray": [{"imageRef": "a", "width": 8}]}
     (tmp_path / "a.lfp").write_bytes(files.lytro_file(entry, {"a": b"x"}))
     with pytest.raises(InputError, match=r"in an unknown way \(no 'height'\); export it with Lytro Desktop"):

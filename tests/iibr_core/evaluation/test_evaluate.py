@@ -13,7 +13,7 @@ from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options, Result, evaluate
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.report import figures_table, render, write_report
+from iibr_core.evaluation.report import figures_table, write_report
 from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
@@ -113,17 +113,6 @@ def test_nan_in_a_true_view_and_in_the_map_give_finite_figures(tmp_path) -> None
     result = evaluate(scene_of(folder), Options(choice=UNREFINED))[0]
     for row in result.rows:
         assert all(np.isfinite([of.full_db, of.ssim, of.flip]).all() for of in row.views.values())
-
-
-def test_views_of_one_pixel(tmp_path) -> None:
-    (tmp_path / "dot" / "views").mkdir(parents=True)
-    for u, value in enumerate((0.2, 0.2, 0.7)):
-        write_image(tmp_path / "dot" / "views" / f"v00_u{u:02d}.png", np.full((1, 1, 3), value, np.float32))
-    np.save(tmp_path / "dot" / "gt_disp_u01_v00.npy", np.zeros((1, 1), np.float32))
-    (result,) = evaluate(scene_of(tmp_path / "dot"))
-    assert full_db(result)["unchanged photo"] == pytest.approx((100 + 20 * math.log10(255 / 128)) / 2, abs=0.2)
-    assert all(math.isnan(row.mean.ssim) for row in result.rows)
-    assert "nan" not in render("report.md", [result], "x")
 
 
 def test_refocus_and_lpips_of_a_rendered_scene(networks) -> None:  # noqa: F811

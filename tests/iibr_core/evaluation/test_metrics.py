@@ -33,11 +33,7 @@ def test_psnr_of_masks_and_of_what_is_not_known() -> None:
     assert psnr(worse, truth, mask) == pytest.approx(10 * math.log10(1 / 0.25), abs=1e-4)
     assert psnr(worse, truth, ~mask) == math.inf
     assert math.isnan(psnr(np.full_like(truth, np.nan), truth))
-
-
-def test_equal_pictures_count_with_a_bound_where_means_are_taken() -> None:
-    image, truth = pair()
-    assert bounded_psnr(image, truth) == psnr(image, truth)
+    assert bounded_psnr(worse, truth) == psnr(worse, truth)
     assert bounded_psnr(truth, truth) == bounded_psnr(truth + np.float32(1e-7), truth) == MAX_DB == 100
     assert math.isnan(bounded_psnr(truth, truth, np.zeros(truth.shape[:2], bool)))
 
@@ -102,19 +98,14 @@ def test_lpips_is_its_slow_twin(networks, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["alexnet-owt-7be5be79.pth", "alex.pth"])
-@pytest.mark.parametrize("content", ["missing", "text", "other shapes"])
-def test_bad_networks_are_one_clear_line(networks, tmp_path, name, content) -> None:
+def test_bad_networks_are_one_clear_line(networks, tmp_path, name) -> None:
     for path in networks.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
-    stored = torch.load(tmp_path / name, weights_only=True)
-    (tmp_path / name).unlink()
-    if content == "text":
-        (tmp_path / name).write_text("no weights")
-    elif content != "missing":
-        torch.save({key: value[:0] for key, value in stored.items()}, tmp_path / name)
-    with pytest.raises(InputError, match=name) as caught:
-        Lpips(tmp_path)
-    assert "\n" not in str(caught.value)
+    shapeless = {key: value[:0] for key, value in torch.load(tmp_path / name, weights_only=True).items()}
+    for damage in (lambda path: torch.save(shapeless, path), lambda path: path.write_text("no weights"), Path.unlink):
+        damage(tmp_path / name)
+        with pytest.raises(InputError, match=rf"^[^\n]*{name}[^\n]*$"):
+            Lpips(tmp_path)
 
 
 MADE_DB = {"shelf": 42.0, "fence": 38.5}

@@ -74,14 +74,6 @@ def test_holes_are_filled_from_behind_and_one_pixel_around_them_is_not_visible()
     assert warped.visible[:3].all()
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1)])
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e6, -1e6, 0.0])
-def test_odd_disparities_give_finite_pictures(shape, value) -> None:
-    photo = np.full((*shape, 3), 0.5, np.float32)
-    warped = reference_warp(photo, np.full(shape, value, np.float32), ViewOffset(1.0, -1.0))
-    assert np.isfinite(warped.colors).all()
-
-
 def fit_of(photo: FloatImage, views: Sequence[tuple[ViewOffset, FloatImage]]) -> ViewFit:
     def warp_to(offset: ViewOffset) -> Warp:
         return lambda colors, disparity: reference_warp(colors, disparity, offset).colors

@@ -140,29 +140,18 @@ def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive
 GREY = np.full((4, 6, 3), 100, np.uint8)
 
 
-def test_maps_hidden_files_and_others_are_no_photos(tmp_path) -> None:
-    for name in ("b.JPG", "a.png", "a_disparity.png", "a_depth.exr", "b_depth.jpg", ".c.png", "d.txt", "low_depth.jpg"):
-        (tmp_path / name).write_bytes(b"-")
-    (tmp_path / "folder.jpg").mkdir()
-    assert {photo.name for photo in list_photos(str(tmp_path))} == {"b.JPG", "a.png", "low_depth.jpg"}
-    assert list_photos(str(tmp_path / "gone")) == ()
-
-
-def test_maps_by_other_names_and_folders_of_maps_are_no_photos(tmp_path) -> None:
-    pictures = ("A.JPG", "A-Depth (1).PNG", "b_rgb.png", "b_depth.png", "in_depth.jpg", "rgb/1.png", "depth/1.png")
-    for name in (*pictures, "deep/depth/1.png"):
+def test_maps_folders_of_maps_hidden_files_and_others_are_no_photos(tmp_path) -> None:
+    """Nor is what was saved or exported of a photo."""
+    photos = {"A.JPG", "b_rgb.png", "low_depth.jpg", "A-b.png", "gone-iibr.png", "A-iibre.png", "-iibr.png"}
+    maps = {"A-Depth (1).PNG", "A_depth.exr", "A_disparity.png", "b_depth.png", ".c.png", "d.txt"}
+    made = {"A-iibr.png", "A-quilt_qs8x6a1.482.png", "A-sbs_2x1.png", "A-rgbd.jpg", "A-b-anaglyph.jpg"}
+    below = {"rgb/1.png", "deep/depth/1.png"}
+    for name in (*photos, *maps, *made, *below, "depth/1.png", "folder.jpg/x.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(b"-")
-    names = {str(path.relative_to(tmp_path)) for path, _ in photos_in([tmp_path])}
-    assert names == {"A.JPG", "b_rgb.png", "in_depth.jpg", "rgb/1.png", "deep/depth/1.png"}
-
-
-def test_what_was_saved_or_exported_of_a_photo_is_none_of_its_folder(tmp_path) -> None:
-    made = ("a-iibr.png", "a-quilt_qs8x6a1.482.png", "a-sbs_2x1.png", "a-rgbd.jpg", "a-b-anaglyph.jpg")
-    kept = ("a.jpg", "a-b.png", "gone-iibr.png", "a-iibre.png", "a-quilted.png", "iibr-quilt.png", "-iibr.png")
-    for name in (*made, *kept):
-        (tmp_path / name).write_bytes(b"-")
-    assert {photo.name for photo in list_photos(str(tmp_path))} == set(kept)
+    assert {photo.name for photo in list_photos(str(tmp_path))} == photos
+    assert {str(path.relative_to(tmp_path)) for path, _ in photos_in([tmp_path])} == photos | below
+    assert list_photos(str(tmp_path / "gone")) == ()
 
 
 @pytest.mark.parametrize("inside", ["", "views"])

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from iibr_core.inpainting.outpainting import (
     ANGLE_POWER,
@@ -91,13 +90,6 @@ def test_against_the_definitions():
     colors, disparity = noise(*SIZE), noise(*SIZE)[..., 0]
     for found, expected in zip(outpaint(colors, disparity, MARGINS), extend_slowly(colors, disparity, MARGINS)):
         np.testing.assert_allclose(found, expected, atol=2e-6)
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 2)], ids=str)
-def test_tiny_photos_of_one_colour_go_on_in_it(size):
-    colors = np.full((*size, 3), 0.25, np.float32)
-    grown, _ = outpaint(colors, np.zeros(size, np.float32), Margins(7, 1, 2, 3))
-    np.testing.assert_allclose(grown, 0.25, atol=1e-6)
 
 
 def textured_wall(disparity):

@@ -18,16 +18,13 @@ def view_with_holes():
     return view.colors, view.disparity, view.occluded, disparity.values
 
 
-def test_an_unknown_name_is_one_line_that_names_those_there_are():
-    with pytest.raises(InputError, match=f"magic: .*{DEFAULT_INPAINTER}"):
-        load_inpainter("magic")
-
-
 @pytest.mark.parametrize("name", MODEL_INPAINTERS)
-def test_a_name_that_needs_a_folder_asks_for_it_and_others_want_none(name):
+def test_a_name_that_needs_a_folder_asks_for_it_and_an_unknown_one_is_told_the_others(name):
     for typed in (name, f"{name}:", f"{DEFAULT_INPAINTER}:folder"):
         with pytest.raises(InputError, match=f"{typed}: .*{name}:FOLDER"):
             load_inpainter(typed)
+    with pytest.raises(InputError, match=f"magic: .*{DEFAULT_INPAINTER}"):
+        load_inpainter("magic")
 
 
 @pytest.mark.parametrize("name", INPAINTERS)

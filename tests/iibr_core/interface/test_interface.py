@@ -225,13 +225,6 @@ def test_what_means_nothing_is_refused_in_one_line(call, tmp_path, monkeypatch) 
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
-def test_the_smallest_photos(size) -> None:
-    field = iibr.from_arrays(np.full((*size, 3), 0.5), np.zeros(size)).light_field(3)
-    assert field.views.shape == (3, 3, *size, 3)
-    assert np.isfinite(field.refocus(3.0, 2.0)).all()
-
-
 def test_stopping_raises_cancelled(tmp_path) -> None:
     scene, made = iibr.from_arrays(*square_scene()), 0
     with pytest.raises(iibr.Cancelled):

@@ -130,13 +130,6 @@ def test_pixels_behind_an_edge_are_split_but_not_on_a_slope(behind, beside, is_s
     assert (split_mixed_pixels(colors, disparity, edge_step=0.45)[3][4, 5] > 0) == is_split
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2), (4, 4)])
-def test_tiny_photos(size):
-    own, *_, coverage = split_mixed_pixels(np.ones((*size, 3), np.float32), np.ones(size, np.float32), 0.5)
-    assert own.min() == 1
-    assert coverage.max() == 0
-
-
 STEPS = (0.1, 1.0)
 
 

@@ -10,7 +10,6 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import focal_px_from_fov, read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.gloss.settings import Gloss, GlossSurface
 from iibr_core.method.plan import MAX_DEPTH_STRENGTH
 from iibr_core.runtime.work import Cancelled, stoppable
@@ -19,9 +18,8 @@ from iibr_core.scenes.opening import results_of, scene_of_photo, sketch_of
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, photo_of_arrays, sketch_photo
 from iibr_core.scenes.scene import DepthSettings, SceneReady, SceneRequest, Source, ViewReady, WantedPhoto
 from iibr_core.scenes.scene_gloss import add_gloss, gloss_request, make_maps
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.scenes import square_before_wall
-from tests.iibr_core.scenes.test_light_fields import showings
 from tests.viewer.conftest import HEIGHT, WIDTH
 
 GRID = GridShape(3, 3)
@@ -172,26 +170,6 @@ def test_a_loaded_photo_is_not_read_again(photo_path) -> None:
     assert again.scene.plan.disparity_scale == pytest.approx(2 * first.scene.plan.disparity_scale)
 
 
-@pytest.mark.parametrize("with_disparity", [True, False])
-def test_a_light_field_folder_goes_the_same_way(tmp_path, photo_path, with_disparity) -> None:
-    made = list(results_of(SceneRequest(1, Source(str(photo_path), grid=GRID)), lambda: CENTRE))
-    views = (result.view for result in made if isinstance(result, ViewReady))
-    write_light_field(tmp_path / "field", "hci", GRID, views, 100.0, "field", with_disparity)
-    ready, views = next(showings(results_of(SceneRequest(2, Source(str(tmp_path / "field"))), lambda: CENTRE)))
-    assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
-    assert ready.scene.has_view_disparity == with_disparity
-    assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
-    assert len(views) == 9
-
-
-def test_a_folder_without_views_is_refused_with_what_would_be_some(tmp_path) -> None:
-    with pytest.raises(InputError, match="no photos in it"):
-        opened(Source(str(tmp_path)))
-    (tmp_path / "notes.txt").touch()
-    with pytest.raises(InputError, match="holds no light field; laid out as HCI, Stanford"):
-        opened(Source(str(tmp_path)))
-
-
 def test_generating_stops_between_row_bands_and_reading_too(photo_path) -> None:
     kinds: list[type] = []
     request = SceneRequest(1, Source(str(photo_path), grid=GRID))
@@ -202,12 +180,6 @@ def test_generating_stops_between_row_bands_and_reading_too(photo_path) -> None:
     assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
     with pytest.raises(Cancelled), stoppable(lambda: True):
         next(results_of(request, lambda: CENTRE))
-
-
-def test_an_avif_photo_opens(tmp_path) -> None:
-    Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
-    loaded = load_photo(Source(str(tmp_path / "a.avif")))
-    assert (loaded.photo.size, loaded.settings, loaded.own_size) == ((32, 48), "", ImageSize(32, 48))
 
 
 SMALLER = 4

@@ -49,13 +49,8 @@ def test_entropy_against_a_loop_and_at_its_limits():
     assert entropy_loss(weights).item() == pytest.approx(slow, rel=1e-12)
     assert entropy_loss(torch.eye(5)).item() == 0
     assert entropy_loss(torch.full((4, 5), 0.2)).item() == pytest.approx(log(5), rel=1e-6)
-
-
-def test_entropy_gradient_is_finite_through_a_softmax_that_underflows():
     logits = torch.tensor([[0.0, -1e4, float("-inf")], [500.0, -500.0, 0.0]], requires_grad=True)
-    loss = entropy_loss(torch.softmax(logits, dim=1))
-    loss.backward()
-    assert loss.item() == 0
+    entropy_loss(torch.softmax(logits, dim=1)).backward()
     assert torch.isfinite(logits.grad).all()
 
 
@@ -87,21 +82,16 @@ def small_scenes():
         yield
 
 
-def test_a_batch_repeats_and_differs_from_others():
+def test_a_batch_is_whole_repeats_and_differs_from_others():
     one, same, other = training_batch(3, seed=1), training_batch(3, seed=1), training_batch(4, seed=1)
     assert torch.equal(one.features, same.features)
     assert torch.equal(one.truth, same.truth)
     assert one.features.shape != other.features.shape or not torch.equal(one.features, other.features)
-
-
-@pytest.mark.parametrize("step", range(1, 4))
-def test_batches_are_finite_and_whole(step):
-    batch = training_batch(step, seed=0)
-    rays = len(batch.truth)
-    assert batch.features.shape == (rays, HYPOTHESES, FEATURES)
-    assert all(torch.isfinite(t).all() for t in (batch.features, batch.colors, batch.truth))
-    assert batch.mask.any(dim=1).all()
-    assert batch.epi_shape is None or np.prod(batch.epi_shape) <= rays
+    for batch in (one, other):
+        assert batch.features.shape == (len(batch.truth), HYPOTHESES, FEATURES)
+        assert all(torch.isfinite(part).all() for part in (batch.features, batch.colors, batch.truth))
+        assert batch.mask.any(dim=1).all()
+        assert batch.epi_shape is None or np.prod(batch.epi_shape) <= len(batch.truth)
 
 
 def test_truth_lies_within_reach_of_the_hypotheses():
