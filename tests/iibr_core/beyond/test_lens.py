@@ -63,7 +63,9 @@ def test_within_the_focus_range_content_stays_where_the_eye_sees_it() -> None:
 def test_what_is_within_the_range_stays_so_where_all_disparities_are_scaled(ratio) -> None:
     """Also where depth is turned inside out."""
     view, wall = smooth_texture(*SIZE), np.full(SIZE, 1.2 * ratio, np.float32)
-    optics = Optics(focus_disparity=0.5, focus_range=1.0).with_focus_scaled(ratio)
+    optics = Optics(focus_disparity=0.5, focus_range=1.0, focus_tilt=(0.2, -0.1)).with_focus_scaled(ratio)
+    assert optics.focus_tilt == (0.2 * ratio, -0.1 * ratio)
+    optics = replace(optics, focus_tilt=(0.0, 0.0))
     moved = sheared(view, wall, CAMERA)
     np.testing.assert_allclose(light_of(optics, (CAMERA, view), disparity=wall)[INSIDE], moved[INSIDE], atol=0.01)
 

@@ -15,12 +15,6 @@ from tests.iibr_core.depth.test_onnx import with_external_weights
 from tests.local_hub import Hub, local_hub
 
 
-@pytest.fixture(autouse=True)
-def folders_here(monkeypatch, tmp_path) -> None:
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
-    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
-
-
 def files_below(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 

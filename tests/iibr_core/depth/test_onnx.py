@@ -26,11 +26,6 @@ MEAN, DEVIATION = (np.array(values, np.float32) for values in (USUAL_PREPARATION
 MAP = np.arange(56 * 84, dtype=np.float32)
 
 
-@pytest.fixture(autouse=True)
-def cache_here(monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path / "cache")
-
-
 def photo_of(height: int, width: int) -> Photo:
     """Channels that tell top from bottom, left from right, and each other."""
     y, x = np.indices((height, width), np.float32) / np.array((height, width), np.float32)[:, None, None]
@@ -176,7 +171,7 @@ def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_
     file, photo = with_external_weights(tmp_path / "model.onnx"), photo_of(60, 90)
     first = values_of(file, photo)
     assert values_of(file, photo).tolist() == first.tolist()
-    assert len(list((tmp_path / "cache").glob("*.npz"))) == 1
+    assert len(list((tmp_path / "cache").rglob("*.npz"))) == 1
     before = file.read_bytes()
     with_external_weights(file, (0.0, 1.0, 0.0))
     assert file.read_bytes() == before, "only the file of numbers changed"
@@ -184,7 +179,7 @@ def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_
     values_of(file, photo_of(61, 90))
     (tmp_path / "preprocessor_config.json").write_text('{"size": 28}')
     assert values_of(file, photo).shape != first.shape
-    assert len(list((tmp_path / "cache").glob("*.npz"))) == 4
+    assert len(list((tmp_path / "cache").rglob("*.npz"))) == 4
     (tmp_path / "model.onnx_data").unlink()
     with pytest.raises(InputError, match=r"its weights are in model\.onnx_data, which does not lie beside it"):
         values_of(file, photo)
@@ -270,8 +265,7 @@ def test_the_focal_length_of_other_metric_models_is_used(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["depth-anything-v2-small-int8", "moge-2-small", "midas-small"])
-def test_published_models_without_settings_take_colours_as_they_were_trained(tmp_path, monkeypatch, name) -> None:
-    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path))
+def test_published_models_without_settings_take_colours_as_they_were_trained(name) -> None:
     model = known_model(name)
     assert model.licence in ("MIT", "Apache-2.0")
     assert model.megabytes < 150

@@ -6,7 +6,6 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.depth.models import cache as estimate_cache
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.picture import upright
 from iibr_core.remedies import Remedy, remedy_of
@@ -20,12 +19,6 @@ SIZE = ImageSize(48, 72)
 DEPTH = np.full(SIZE, 200, np.uint8)
 DEPTH[12:36, 24:48] = 20  # dark is near
 NEAR = np.s_[12:36, 24:48]
-
-
-@pytest.fixture(autouse=True)
-def nothing_at_hand(monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
-    monkeypatch.setattr(estimate_cache, "cache_folder", lambda: tmp_path / "cache")
 
 
 def photo_file(folder: Path, depth: np.ndarray | bytes | None = DEPTH, orientation: int = 1, **options: object) -> Path:

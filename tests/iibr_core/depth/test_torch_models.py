@@ -10,7 +10,6 @@ import torch
 import transformers
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.models import cache
 from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.models.preparation import network_input, read_preparation
 from iibr_core.depth.models.torch_models import PREPARATIONS
@@ -19,11 +18,6 @@ from tests.iibr_core.depth.random_networks import depth_anything, depth_pro, zoe
 
 RNG = np.random.default_rng(3)
 PHOTO = Photo(RNG.random((40, 60, 3)).astype(np.float32), 50.0, "photo")
-
-
-@pytest.fixture(autouse=True)
-def cache_here(monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path / "cache")
 
 
 @pytest.mark.parametrize(
@@ -93,7 +87,7 @@ def test_damaged_folders_are_one_line(name, damage, message, tmp_path) -> None:
     damage(folder / name)
     with pytest.raises(InputError, match=rf"^[^\n]*{message}[^\n]*$"):
         model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)
-    assert not list((tmp_path / "cache").glob("*")), "nothing of that is kept"
+    assert not list((tmp_path / "cache").rglob("*.npz")), "nothing of that is kept"
 
 
 UNIDEPTH = """

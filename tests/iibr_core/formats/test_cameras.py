@@ -67,8 +67,6 @@ def test_infinity_is_known_with_metres_unless_everything_would_lie_beyond(invers
 
 FIELD, FIELD_SIZE = GridShape(2, 3), ImageSize(40, 48)
 VIEWS = {f"v{v:02d}_u{u:02d}.png": FIELD.offset(v, u) for v, u in np.ndindex(*FIELD)}
-FORWARD = np.eye(3)[:, [1, 0, 2]] * [1, 1, -1]
-"""LLFF's rotation (columns down, right, backwards) of a camera that looks along z."""
 
 
 def write_field(folder: Path, kind: str, at_infinity=0.0):
@@ -139,39 +137,18 @@ def test_colmaps_quaternion_is_from_the_world(tmp_path):
     assert camera.source.endswith("a b.png")
 
 
-def read_binary(path: Path, record: str) -> list[tuple]:
-    """Return the records of a binary model's file; a name and an observation follow in images.bin."""
-    (count,), data = struct.unpack("<Q", path.read_bytes()[:8]), path.read_bytes()[8:]
-    records = []
-    for _ in range(count):
-        values, data = struct.unpack(record, data[: struct.calcsize(record)]), data[struct.calcsize(record) :]
-        if path.name == "images.bin":
-            name, data = data.split(b"\0", 1)
-            values, data = (*values, name.decode(), *struct.unpack("<QddQ", data[:32])), data[32:]
-        records.append(values)
-    assert not data
-    return records
-
-
 def test_colmaps_binary_model_holds_the_same_as_its_text(tmp_path):
     """Programs take only the one or the other, and some stop reading text at an empty line."""
     points, colors = np.float32([[0.5, -2, 4], [1, 2, 3]]), np.uint8([[1, 2, 3], [250, 251, 252]])
-    cameras = FieldCameras(FIELD, FIELD_SIZE, 50.0, (1.0, 4.0), -0.5)
-    write_colmap(tmp_path, cameras, VIEWS, points, colors)
-    model = tmp_path / "sparse" / "0"
-    text = {name: (model / f"{name}.txt").read_text().splitlines() for name in ("cameras", "images", "points3D")}
-    assert all(line for lines in text.values() for line in lines)
-    for line, values in zip(text["cameras"], read_binary(model / "cameras.bin", "<IiQQ4d"), strict=True):
-        assert line.replace(" PINHOLE ", " 1 ") == " ".join(map(str, values))
-    images = read_binary(model / "images.bin", "<I7dI")
-    for line, observed, values in zip(text["images"][::2], text["images"][1::2], images, strict=True):
-        assert line == " ".join(map(str, values[:10]))
-        assert observed == f"{values[-3]} {values[-2]} -1"
-        assert (values[10], values[-1]) == (1, 2**64 - 1), "one observation, of no point"
-    binary = read_binary(model / "points3D.bin", "<Q3d3BdQ")
-    assert [line.split() for line in text["points3D"]] == [[f"{value:g}" for value in row[:-1]] for row in binary]
+    write_colmap(tmp_path, FieldCameras(FIELD, FIELD_SIZE, 50.0, (1.0, 4.0), -0.5), VIEWS, points, colors)
+    model, text_only = tmp_path / "sparse" / "0", tmp_path / "text"
+    assert all(line for path in model.glob("*.txt") for line in path.read_text().splitlines())
+    rows = [line.split() for line in (model / "points3D.txt").read_text().splitlines()]
+    data = (model / "points3D.bin").read_bytes()
+    binary = list(struct.iter_unpack("<Q3d3BdQ", data[8:]))
+    assert struct.unpack("<Q", data[:8]) == (2,)
+    assert rows == [[f"{value:g}" for value in row[:-1]] for row in binary]
     assert [row[-1] for row in binary] == [0, 0], "observed nowhere"
-    text_only = tmp_path / "text"
     text_only.mkdir()
     for name in ("cameras.txt", "images.txt"):
         (model / name).rename(text_only / name)
@@ -188,17 +165,10 @@ def test_colmaps_binary_model_holds_the_same_as_its_text(tmp_path):
         ("images", lambda data: data[:-120], "is not a model of COLMAP"),
         ("images", lambda data: struct.pack("<Q", 2**60) + data[8:], "poses"),
         ("images", lambda data: data.replace(b"\0v", b"xv").replace(b"png\0", b"png "), "is not a model of COLMAP"),
-        ("images", lambda data: struct.pack("<Q", 1) + data[8:81] + struct.pack("<QQ", 2**63, 5), "not a model"),
         ("images", lambda data: data[:12] + struct.pack("<4d", 0, 0, 0, 0) + data[44:], "a quaternion of length 0"),
-        (
-            "images",
-            lambda data: data[:12] + struct.pack("<4d", 1e300, 1e300, 0, 0) + data[44:],
-            "a quaternion of length inf",
-        ),
         ("cameras", lambda data: data[:12] + struct.pack("<i", 4) + data[16:] + bytes(32), "is OPENCV; undistort"),
         ("cameras", lambda data: data[:12] + struct.pack("<i", 99) + data[16:], "unknown camera model 99"),
         ("cameras", lambda data: data[:16] + struct.pack("<Q", 2**62) + data[24:], "pixels"),
-        ("cameras", lambda data: data[:8] + struct.pack("<I", 7) + data[12:], "is not a model of COLMAP"),
     ],
 )
 def test_damaged_and_distorted_binary_models_are_refused(tmp_path, name, change, message):
@@ -213,22 +183,15 @@ def test_damaged_and_distorted_binary_models_are_refused(tmp_path, name, change,
     [
         ({"camera_model": "OPENCV", "k1": -0.35, "k2": 0.12}, "k1 = -0.35, k2 = 0.12.*undistort the pictures"),
         ({"p2": 0.01}, "p2 = 0.01"),
-        ({"k4": "0.1"}, "k4 = 0.1"),
-        ({"k1": float("inf")}, "transforms.json"),
         ({"camera_model": "OPENCV_FISHEYE"}, "model OPENCV_FISHEYE.*undistort"),
-        ({"camera_model": "EQUIRECTANGULAR"}, "model EQUIRECTANGULAR"),
         ({"is_fisheye": True}, "is_fisheye = True"),
         ({"distortion_params": [0.1, 0]}, "distortion_params"),
     ],
 )
-@pytest.mark.parametrize("place", ["file", "frame"])
-def test_cameras_that_distort_are_refused(tmp_path, values, message, place):
+def test_cameras_that_distort_are_refused_and_stated_distortions_of_zero_are_none(tmp_path, values, message):
     frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
-    changes = values if place == "file" else {"frames": [frame, {**frame, **values}]}
-    require_refusal(message, read_transforms, tmp_path, **changes)
-
-
-def test_stated_distortions_of_zero_are_none(tmp_path):
+    for changes in (values, {"frames": [frame, {**frame, **values}]}):
+        require_refusal(message, read_transforms, tmp_path, **changes)
     none = {"camera_model": "OPENCV", "k1": 0, "k2": 1e-5, "p1": None, "is_fisheye": False}
     assert read_transforms(tmp_path, **none)[0].focal_px == (50.0, 50.0)
 
@@ -239,6 +202,10 @@ def test_stated_distortions_of_zero_are_none(tmp_path):
         ({"fl_x": float("nan")}, "transforms.json"),
         ({"fl_x": None}, "focal length"),
         ({"w": 0}, "pixels"),
+        (
+            {"w": None, "frames": [{"file_path": "a/../../a.png", "transform_matrix": np.eye(4).tolist()}]},
+            "pose 1: its picture .* does not lie beside the file",
+        ),
         ({"frames": []}, "0 poses"),
         ({"frames": [{"transform_matrix": np.zeros((4, 4)).tolist()}]}, "rotation"),
         ({"frames": [{"file_path": "a.png"}]}, "4x4"),
@@ -247,11 +214,3 @@ def test_stated_distortions_of_zero_are_none(tmp_path):
 )
 def test_invalid_cameras_are_refused(tmp_path, changes, message):
     require_refusal(message, read_transforms, tmp_path, **changes)
-
-
-@pytest.mark.parametrize("name", ["/etc/passwd", "a/../../a.png", "..\\a.png"])
-def test_a_picture_elsewhere_is_never_opened(tmp_path, name):
-    frame = {"file_path": name, "transform_matrix": np.eye(4).tolist()}
-    require_refusal(
-        "pose 1: its picture .* does not lie beside the file", read_transforms, tmp_path, w=None, frames=[frame]
-    )

@@ -28,6 +28,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
     "canon.tif": (b"II*\0\x10\0\0\0CR\x02\0" + bytes(60), RAW),
     "a.cr3": (b"\0\0\0\x18ftypcrx \0\0\0\1crx isom" + bytes(60), RAW),
     "unknown.3fr": (b"\x80\x81" * 50, RAW),
+    "IMG_0001.lfr": (b"\x89LFP\r\n\x1a\n" + bytes(100), r"a raw light field \(Lytro\), .* decoded first: PlenoptiCam"),
     "a.mp4": (FTYP + b"isom" + bytes(60), VIDEO),
     "page.jpg": (b"<!DOCTYPE html><html>404</html>", PAGE),
     "a.svg": (b"<svg xmlns='http://www.w3.org/2000/svg'/>", SVG),

@@ -49,7 +49,7 @@ def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") ->
 def test_a_large_photo_has_a_sketch(tmp_path) -> None:
     source = Source(str(write_large_photo(tmp_path)), grid=GRID)
     sketch = sketch_of(WantedPhoto(source, 1.0))
-    whole = opened(source)
+    whole = opened(replace(source, depth=DepthChoice("flat")))
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
     assert (sketch.scene.is_sketch, sketch.loaded, sketch.scene.name) == (True, None, whole.scene.name)
     assert sketch.centre.colors.shape == (360, 480, 3)
