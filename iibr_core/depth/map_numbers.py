@@ -126,6 +126,8 @@ def _fills_areas(mask: NDArray[np.bool_]) -> bool:
 
     Sensors and matching leave out scattered patches, and lines along edges.
     """
+    if mask.mean() < AREA_SHARE:
+        return False
     # Opening: only areas that hold a whole square survive.
     radius = max(1, round(AREA_SHARE * mask.shape[1] / 2))
     inner = box_filter(mask.astype(np.float32), radius) > 1 - 1e-4

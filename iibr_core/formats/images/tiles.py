@@ -45,7 +45,7 @@ def _tiles_along(luma: FloatImage) -> int:
         tile = length / count
         borders = np.rint(np.arange(1, count) * tile).astype(int) - 1
         jumps = np.maximum.reduce([steps[(borders + k).clip(0, length - 2)] for k in (-1, 0, 1)])
-        is_alike = difference(tile / 2) > MIN_ALIKE * difference(tile)
-        if is_alike and np.median(jumps) > MIN_JUMP * mean_step > 0:
+        is_cut = np.median(jumps) > MIN_JUMP * mean_step > 0
+        if is_cut and difference(tile / 2) > MIN_ALIKE * difference(tile):
             return count
     return 1
