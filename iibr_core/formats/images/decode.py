@@ -1,4 +1,4 @@
-"""Decodes picture files of every kind. Headers are checked before memory is spent; a file is read whole, or refused."""
+"""Decodes picture files of every kind. Headers are checked before memory is spent. A JPEG is read as far as it goes."""
 
 import itertools
 import re
@@ -24,6 +24,8 @@ from iibr_core.types import ImageSize, InputError
 
 HARMLESS_MESSAGE = "extraneous bytes"
 """Complaint of the JPEG decoder about padding, which some cameras write; nothing is lost."""
+CUT_OFF_MESSAGE = "Premature end of JPEG file"
+"""Complaint of the JPEG decoder about a file that is cut off; it makes the rest of the picture grey."""
 NO_READER = "could not find a format reader"
 """Complaint of OpenImageIO about a file of unknown kind."""
 TEXT_NAMES = ("ImageDescription", "iibr:settings", "iibr:Lenslet")
@@ -103,7 +105,7 @@ def oiio_bands(path: Path) -> Iterator[Picture]:
     spec, stored = source.spec(), _stored(path, source.spec())
     if stored.alpha_at < 0 and stored.dtype in ("uint8", "uint16"):
         facts = _facts(spec)
-        yield from (Picture(rows, **facts) for rows in _read_rows(path, source, stored))
+        yield from (Picture(rows, is_cut_off=cut, **facts) for rows, cut in _read_rows(path, source, stored))
     else:
         yield _decode_with_oiio(path)
 
@@ -161,14 +163,15 @@ def _decode_with_oiio(path: Path) -> Picture:
     source = _open(path)
     spec, stored = source.spec(), _stored(path, source.spec())
     values: NDArray[Any] = np.empty((spec.height, spec.width, stored.channels), stored.dtype)
-    first = 0
-    for rows in _read_rows(path, source, stored):  # all at once would take the memory twice
+    first, is_cut_off = 0, False
+    for rows, ends_before in _read_rows(path, source, stored):  # all at once would take the memory twice
+        is_cut_off |= ends_before
         values[first : first + len(rows)] = rows
         first += len(rows)
     colors = values[..., : stored.colors]
     wide = colors if stored.dtype in WIDE_TYPES.values() else None
     alpha = opaque_as_none(_narrowed(values[..., stored.alpha_at])) if stored.alpha_at >= 0 else None
-    return Picture(_narrowed(colors), alpha, wide=wide, **_facts(spec))
+    return Picture(_narrowed(colors), alpha, wide=wide, is_cut_off=is_cut_off, **_facts(spec))
 
 
 def _narrowed(values: NDArray[Any]) -> NDArray[Any]:
@@ -199,8 +202,9 @@ def _is_reduced(spec: Any) -> bool:
     return bool(spec.get_int_attribute("tiff:subfiletype", 0) & IS_REDUCED)
 
 
-def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any]]:
-    """Yield the rows of a picture from top to bottom, (h, W, channels)."""
+def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[tuple[NDArray[Any], bool]]:
+    """Yield the rows of a picture from top to bottom, (h, W, channels), and whether its file has ended before them."""
+    is_cut_off = False
     spec, oiio_type = source.spec(), stored.dtype.removesuffix("32")
     step = spec.tile_height or ROWS_AT_ONCE
     for first in range(0, spec.height, step):
@@ -212,9 +216,10 @@ def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any
         else:
             rows = source.read_scanlines(top, bottom, spec.z, 0, stored.channels, oiio_type)
         message = complaint_of(source)
-        if rows is None or (message and HARMLESS_MESSAGE not in message):
+        is_cut_off |= rows is not None and CUT_OFF_MESSAGE in message and bool(np.ptp(rows))
+        if rows is None or (message and HARMLESS_MESSAGE not in message and not is_cut_off):
             raise InputError(f"{path}: {decoding_fault(_without_name(message, path))}")
-        yield np.asarray(rows).reshape(bottom - top, spec.width, stored.channels)
+        yield np.asarray(rows).reshape(bottom - top, spec.width, stored.channels), is_cut_off
 
 
 def _facts(spec: Any) -> dict[str, Any]:

@@ -32,6 +32,8 @@ MAX_BAND_ROWS = 32
 MAX_BAND_PIXELS = 1 << 20
 """Largest number of stored pixels that are averaged at a time: as floats they take 12 bytes each, or more."""
 
+CUT_OFF = "The file is cut off: what is missing is grey. Get the whole file again."
+
 
 def read_photo(
     path: Path,
@@ -43,8 +45,8 @@ def read_photo(
 
     Of a stereo pair the left eye's picture is read, of an animation the first one. fov_deg: horizontal field of view
     where the file states no focal length. keeps_primaries: whether the photo stays in the colour space of its file;
-    else it is converted to sRGB, which cuts off colours outside it. Raises InputError, naming the file, if it is
-    missing, no picture, cut off, or absurdly large.
+    else it is converted to sRGB, which cuts off colours outside it. A JPEG that is cut off is read as far as it goes.
+    Raises InputError, naming the file, if it is missing, no picture, cut off, or absurdly large.
     """
     photo = read_picture(left_picture(Path(path)), max_pixels, fov_deg, keeps_primaries)
     return replace(photo, notes=photo.notes + file_notes(Path(path)) + tile_note(photo.pixels))
@@ -63,11 +65,14 @@ def read_picture(
     stored_size = source_size(source)
     size = size_within(stored_size, max_pixels)
     is_smaller, is_whole = size != stored_size, source == PictureSource(source.path)
-    bands = open_picture(source.path).bands() if is_smaller and is_whole else iter([read_source(source)])
+    opened = open_picture(source.path)
+    bands = opened.bands() if is_smaller and is_whole else iter([opened.decode() if is_whole else read_source(source)])
     picture, finite_notes = _finite(next(bands))
+    is_cut_off = picture.is_cut_off
     try:
         if is_smaller:
-            encoded = _encode_light(_averaged(picture, bands, stored_size, size), picture)
+            light, is_cut_off = _averaged(picture, bands, stored_size, size)
+            encoded = _encode_light(light, picture)
         else:
             encoded = _encode(picture)
     except StopIteration as error:  # the header states another size than the picture has
@@ -77,6 +82,8 @@ def read_picture(
         encoded, space = convert(encoded, SRGB, space), SRGB
     note = picture.note or color_profile_of(picture)[1]
     notes: tuple[str, ...] = (note,) if note else ()
+    if is_cut_off:
+        notes += (CUT_OFF,)
     if picture.alpha is not None:
         notes += ("Transparency was dropped: the photo is laid over black.",)
     pixels = upright(encoded, picture.orientation)
@@ -191,8 +198,10 @@ def _encode_light(linear: FloatImage, picture: Picture) -> FloatImage:
     return linear
 
 
-def _averaged(first_band: Picture, bands: Iterator[Picture], stored_size: ImageSize, size: ImageSize) -> FloatImage:
-    """Return the mean linear light (H, W, 3) of a picture at a smaller size.
+def _averaged(
+    first_band: Picture, bands: Iterator[Picture], stored_size: ImageSize, size: ImageSize
+) -> tuple[FloatImage, bool]:
+    """Return the mean linear light (H, W, 3) of a picture at a smaller size, and whether its file is cut off.
 
     first_band, bands: the rows of the picture from top to bottom; few of them are floats at a time.
     """
@@ -204,13 +213,14 @@ def _averaged(first_band: Picture, bands: Iterator[Picture], stored_size: ImageS
         bottom = min(top + band_rows, size.height)
         first, last = top * stored_size.height // size.height, -(-bottom * stored_size.height // size.height)
         while kept_from + kept.size.height < last:
-            pixels = np.concatenate([kept.pixels[max(first - kept_from, 0) :], next(bands).pixels])
-            kept, kept_from = replace(kept, pixels=pixels), max(first, kept_from)
+            band = next(bands)
+            pixels = np.concatenate([kept.pixels[max(first - kept_from, 0) :], band.pixels])
+            kept, kept_from = replace(kept, pixels=pixels, is_cut_off=band.is_cut_off), max(first, kept_from)
         rows = slice(first - kept_from, last - kept_from)
         alpha = None if kept.alpha is None else kept.alpha[rows]
         light = linear_light(replace(kept, pixels=kept.pixels[rows], alpha=alpha))
         _average_areas(light, row_step, top, first, result[top:bottom])
-    return result
+    return result, kept.is_cut_off
 
 
 @kernel

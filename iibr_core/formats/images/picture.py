@@ -40,6 +40,7 @@ class Picture:
     bits; None for other files. icc: colour profile, b"" without one. codes: colours in numbers (ITU-T H.273), primaries
     and transfer curve first, () without them. chromaticities: x and y of red, green, blue and white as OpenEXR has
     them, () without them. note: for people, on colours that the decoder converted from CMYK or Lab; "" without.
+    is_cut_off: whether the file ends before the picture, the rest of which is grey.
     """
 
     pixels: NDArray[Any]
@@ -52,6 +53,7 @@ class Picture:
     codes: tuple[int, ...] = ()
     chromaticities: tuple[float, ...] = ()
     note: str = ""
+    is_cut_off: bool = False
 
     @property
     def size(self) -> ImageSize:

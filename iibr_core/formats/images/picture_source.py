@@ -63,8 +63,10 @@ def shown_size(source: PictureSource) -> ImageSize:
 
 
 def read_source(source: PictureSource) -> Picture:
-    """Decode a picture: a part of it upright, a whole one as stored."""
+    """Decode a picture: a part of it upright, a whole one as stored. Raises InputError if its file is cut off."""
     picture = open_picture(source.path).decode(source.number)
+    if picture.is_cut_off:
+        raise InputError(f"{source.path}: cut off; get the whole file again")
     return picture if source == source.whole else part_of(picture, source)
 
 

@@ -12,6 +12,7 @@ from iibr_core.formats.images import photo as photo_module
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo, read_thumbnail
 from iibr_core.formats.images.picture import FILM_DIAGONAL_MM
+from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ImageSize, InputError
@@ -194,6 +195,22 @@ def test_what_cannot_be_read_is_refused_in_one_line(tmp_path, name, max_pixels, 
     with pytest.raises(InputError, match=reason) as caught:
         read_photo(tmp_path / name, max_pixels)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("max_pixels", [2_000_000, 20_000])
+def test_a_jpeg_that_is_cut_off_opens_as_far_as_it_goes_but_is_no_view_and_no_map(tmp_path, max_pixels):
+    pixels = RNG.integers(0, 256, (300, 200, 3), dtype=np.uint8)
+    whole = read_photo(write_oiio(tmp_path / "whole.jpg", pixels), max_pixels)
+    content, path = (tmp_path / "whole.jpg").read_bytes(), tmp_path / "cut.jpg"
+    path.write_bytes(content[: len(content) // 2])
+    photo = read_photo(path, max_pixels)
+    assert photo.size == whole.size
+    there = photo.size.height * 2 // 5
+    assert np.array_equal(photo.pixels[:there], whole.pixels[:there])
+    assert np.ptp(photo.pixels[-there:]) == 0, "grey"
+    assert "cut off" in photo.notes[0]
+    with pytest.raises(InputError, match=r"cut\.jpg: cut off; get the whole file again"):
+        read_source(PictureSource(path))
 
 
 def test_an_avif_is_turned_and_has_focal_length_and_profile(tmp_path):
