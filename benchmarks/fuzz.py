@@ -30,6 +30,7 @@ from hypothesis import strategies as st
 from PIL import Image, PngImagePlugin
 
 from benchmarks.report import is_wanted
+from iibr_core.beyond.aperture_mask import read_mask
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.cameras import FieldCameras, write_nerfstudio
@@ -46,7 +47,6 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core import embedded_files
 from viewer.app.preferences_store import load_preferences
-from viewer.model.aperture_mask import read_mask
 from viewer.model.saved_settings import read_settings, settings_text
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings

@@ -40,7 +40,8 @@ def _edge_distance(shape: ApertureShape, t: Doubles, s: Doubles, radius: float) 
         half = math.pi / shape.blades
         angles = math.radians(shape.rotation_deg) + (2 * np.arange(shape.blades) + 1) * half  # a corner is on top
         outward = np.multiply.outer(s, np.sin(angles)) - np.multiply.outer(t, np.cos(angles))
-        return np.asarray(radius * math.cos(half) - outward.max(-1))
+        straight, round_share = radius * math.cos(half) - outward.max(-1), shape.roundness
+        return np.asarray((1 - round_share) * straight + round_share * (radius - np.hypot(t, s)))
     distance = np.hypot(t, s)
     if shape.kind == "ring":
         return np.minimum(radius - distance, distance - radius * shape.ring_inner)

@@ -11,8 +11,10 @@ from iibr_core.types import ViewOffset
 CENTRE = ViewOffset(0.0, 0.0)
 EXPOSURE_LIMIT_STOPS = 6.0
 RING_INNER_LIMIT = 0.95
-HIGHLIGHT_GAIN = 15.0
-"""Light that full highlight recovery adds to clipped pixels, where white is 1: four stops in all."""
+HIGHLIGHT_STOPS = 4.0
+"""Stops by which full highlight recovery makes clipped pixels brighter than white."""
+HIGHLIGHT_GAIN = 2**HIGHLIGHT_STOPS - 1
+"""Light that it adds to them, where white is 1."""
 
 LIMITS = "limits"
 """Key of a field's limits in its metadata, if they are the same for every scene."""
@@ -43,7 +45,8 @@ class ApertureShape:
 
     blades: corners of the polygon, 3 to 11. rotation_deg: turns polygon and mask clockwise. ring_inner: radius of the
     ring's blocked middle as a share of the opening's. cat_eye: 0..1, how much of the opening the lens barrel cuts off
-    in the picture's corners. mask: None unless kind is "mask".
+    in the picture's corners. mask: None unless kind is "mask". roundness: 0..1, how far the polygon's sides are bent
+    outward, from straight to the circle.
     """
 
     kind: ApertureKind = "disc"
@@ -52,6 +55,7 @@ class ApertureShape:
     ring_inner: float = within(0.0, RING_INNER_LIMIT, 0.5)
     cat_eye: float = within(0.0, 1.0, 0.5)
     mask: ApertureMask | None = None
+    roundness: float = within(0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)

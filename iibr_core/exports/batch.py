@@ -35,7 +35,7 @@ from iibr_core.formats.quilts import TAG
 from iibr_core.runtime import machine
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.inputs import inputs_of
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 

@@ -20,7 +20,7 @@ from iibr_core.formats.images.write import write_picture
 from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.work import raise_if_stopped, report_progress
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
 from iibr_core.types import SRGB, ColorSpace, ViewOffset, ViewUpdate

@@ -1,14 +1,12 @@
 """Limits of the lens for a scene; sliders and clamps take their ends from here."""
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
-from iibr_core.beyond.optics import HIGHLIGHT_GAIN, LIMITS, PINHOLE, ApertureShape, Optics
-from iibr_core.gloss.settings import Gloss
-from iibr_core.scenes.f_numbers import aperture_of
+from iibr_core.beyond.optics import LIMITS, ApertureShape, Optics
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 
 Record = TypeVar("Record", Optics, ApertureShape)
 
@@ -135,64 +133,3 @@ def _within_limits(record: Record) -> Record:
 def first_aperture(scene: Scene) -> float:
     """Return the aperture, in view steps, to which focusing opens a pinhole; 0 for a single view."""
     return aperture_of_disc(scene, FIRST_DISC)
-
-
-@dataclass(frozen=True)
-class LensChoice:
-    """Choices about the lens before a scene is open, as in `Optics`; None for the usual value.
-
-    focus_at: place (x, y) of the photo that is in focus, in pixels of its own size. f_number: of a full-frame lens, as
-    the window shows it. highlights: stops by which clipped light is brighter than white.
-    """
-
-    eye: ViewOffset | None = None
-    focus: float | None = None
-    aperture: float | None = None
-    gloss: Gloss | None = None
-    focus_at: tuple[float, float] | None = None
-    f_number: float | None = None
-    focus_range: float | None = None
-    tilt: tuple[float, float] | None = None
-    shape: ApertureShape | None = None
-    highlights: float | None = None
-
-    def optics_on(self, scene: Scene, disparity: FloatImage | None = None, optics: Optics = PINHOLE) -> Optics:
-        """Return the optics as near to the choices as the scene allows; a focus opens a pinhole a little.
-
-        disparity (H, W): of the centre view, needed for `focus_at`. optics: of what is not chosen. Raises InputError
-        if the scene has no depth for a choice, or no such place.
-        """
-        focus = self.focus
-        if self.focus_at is not None:
-            focus = _disparity_at(self.focus_at, scene, disparity)
-        aperture = self.aperture
-        if self.f_number is not None:
-            aperture = aperture_of(scene, self.f_number)
-            if aperture is None:
-                raise InputError(f"f/{self.f_number:g}: {scene.name} has no depth; give an aperture in view steps")
-        if aperture is None:
-            is_focused = focus is not None and optics.aperture_diameter == 0
-            aperture = first_aperture(scene) if is_focused else optics.aperture_diameter
-        chosen: dict[str, Any] = {
-            "eye": self.eye,
-            "focus_disparity": focus,
-            "aperture_diameter": aperture,
-            "gloss": self.gloss,
-            "focus_range": self.focus_range,
-            "focus_tilt": self.tilt,
-            "aperture_shape": self.shape,
-            "highlight_recovery": None if self.highlights is None else (2**self.highlights - 1) / HIGHLIGHT_GAIN,
-        }
-        given = {name: value for name, value in chosen.items() if value is not None}
-        return clamp_optics(replace(optics, **given), scene)
-
-
-def _disparity_at(place: tuple[float, float], scene: Scene, disparity: FloatImage | None) -> float:
-    """Return the disparity at a place of the photo, in pixels of its own size. Raises InputError without one."""
-    x, y = place
-    width, height = scene.own_size or scene.size
-    if not (0 <= x < width and 0 <= y < height):
-        raise InputError(f"focus at {x:g},{y:g}: lies outside the picture; give x below {width} and y below {height}")
-    if disparity is None:
-        raise InputError(f"focus at {x:g},{y:g}: {scene.name} has no depth; give a disparity in focus")
-    return float(disparity[int(y * scene.height / height), int(x * scene.width / width)])

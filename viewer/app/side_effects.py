@@ -229,7 +229,7 @@ def _find_display() -> Action:
 
 def _read_mask(path: Path) -> Action:
     """Read an aperture mask and return the action that uses it. Raises InputError."""
-    from viewer.model.aperture_mask import read_mask
+    from iibr_core.beyond.aperture_mask import read_mask
 
     mask = read_mask(path)
 

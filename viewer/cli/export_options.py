@@ -90,6 +90,11 @@ class KindOptions:
 
 KIND_SPECIFIC_OPTIONS = {"keys", "row", "show", *(field.name for field in (*fields(LensOptions), *fields(KindOptions)))}
 """Options that only some kinds support."""
+LENS_WORDS = {
+    "focus": ("focus_at", "focus_range", "tilt"),
+    "aperture": ("f_number", "blades", "roundness", "rotation", "ring", "cat_eye", "mask", "highlights"),
+}
+"""Options that come with the focus and with the aperture."""
 
 
 def require_kind(context: typer.Context, name: str) -> kinds.ExportKind:
@@ -98,7 +103,8 @@ def require_kind(context: typer.Context, name: str) -> kinds.ExportKind:
     Raises InputError if options were given that the kind does not support, or if a package that it needs is missing.
     """
     kind = EXPORTS[name]
-    supported = {*kind.supports, *(("gloss",) if kind.has_colors else ())}
+    lens = (word for part in kind.supports for word in LENS_WORDS.get(part, ()))
+    supported = {*kind.supports, *lens, *(("gloss",) if kind.has_colors else ())}
     require_not_given(context, KIND_SPECIFIC_OPTIONS - supported, f"not for --to {name}")
     if kind.needs:
         require_extra("export", *kind.needs)

@@ -7,11 +7,11 @@ import re
 from collections.abc import Callable, Collection, Set
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import typer
 
-from iibr_core.beyond.optics import RING_INNER_LIMIT, ApertureKind, ApertureShape, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.order import Arrangement, Flip, Order
@@ -19,7 +19,8 @@ from iibr_core.gloss.settings import Gloss
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.f_numbers import aperture_of
 from iibr_core.scenes.inputs import inputs_of
-from iibr_core.scenes.lens_limits import LensChoice, eye_limits
+from iibr_core.scenes.lens_choice import LENS_LIMITS, LensChoice
+from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
@@ -267,6 +268,12 @@ GlossFile = Annotated[
 ]
 
 
+def lens_number(name: str, text: str, metavar: str = "X") -> Any:
+    """Return an option for a number of the lens, with its limits."""
+    low, high = LENS_LIMITS[name]
+    return option(text, metavar, min=low, max=None if math.isinf(high) else high)
+
+
 @dataclass(frozen=True)
 class LensOptions:
     """Values of the options of the lens, None if an option is not given."""
@@ -287,72 +294,43 @@ class LensOptions:
         option("Place of the photo in focus: pixels from the left and the top.", "X,Y", parser=pair_from_text),
     ] = None
     focus_range: Annotated[
-        float | None, option("Disparity before and behind the focus that is sharp, too.", "X", min=0)
+        float | None, lens_number("focus_range", "Disparity before and behind the focus that is sharp, too.")
     ] = None
     tilt: Annotated[
         Pair | None,
         option("Change of the focus to the right and to the lower border, in disparity.", "X,Y", parser=pair_from_text),
     ] = None
-    aperture: Annotated[float | None, option("Aperture diameter in view steps.", "X", min=0)] = None
+    aperture: Annotated[float | None, lens_number("aperture", "Aperture diameter in view steps.")] = None
     f_number: Annotated[
-        float | None, option("Aperture as f-number of a full-frame lens, as the window shows it.", "N", min=0.1)
+        float | None, lens_number("f_number", "Aperture as f-number of a full-frame lens, as the window shows it.", "N")
     ] = None
-    blades: Annotated[int | None, option("Polygon with so many corners as aperture.", "N", min=3, max=11)] = None
-    ring: Annotated[
-        float | None, option("Ring as aperture; blocked share of its radius.", "X", min=0, max=RING_INNER_LIMIT)
+    blades: Annotated[int | None, lens_number("blades", "Polygon with so many corners as aperture.", "N")] = None
+    roundness: Annotated[
+        float | None, lens_number("roundness", "Roundness of the sides between blades: 0 is straight, 1 a circle.")
     ] = None
+    rotation: Annotated[
+        float | None, option("Turn of blades or a mask, clockwise.", "DEG", parser=number_from_text)
+    ] = None
+    ring: Annotated[float | None, lens_number("ring", "Ring as aperture; blocked share of its radius.")] = None
     cat_eye: Annotated[
-        float | None, option("Round aperture that the barrel cuts off in the corners.", "X", min=0, max=1)
+        float | None, lens_number("cat_eye", "Round aperture that the barrel cuts off in the corners.")
     ] = None
     mask: Annotated[Path | None, option("Grey picture as aperture, white is open.", "FILE")] = None
-    rotation: Annotated[float | None, option("Turn of a polygon or mask, clockwise.", "DEG")] = None
     highlights: Annotated[
-        float | None, option("Stops by which clipped light counts for more than white.", "X", min=0, max=4)
+        float | None, lens_number("highlights", "Stops by which clipped light counts for more than white.")
     ] = None
     gloss: GlossFile = None
 
     def choice(self) -> LensChoice:
         """Return the same for the core. Raises InputError if a file cannot be read, and for options at odds."""
-        if self.focus is not None and self.focus_at is not None:
-            raise InputError("--focus and --focus-at: give one of both")
-        if self.aperture is not None and self.f_number is not None:
-            raise InputError("--aperture and --f-number: give one of both")
-        return LensChoice(
-            self.view,
-            self.focus,
-            self.aperture,
-            gloss_of(self.gloss),
-            self.focus_at,
-            self.f_number,
-            self.focus_range,
-            self.tilt,
-            self._shape(),
-            self.highlights,
-        )
+        mask = None
+        if self.mask is not None:
+            from iibr_core.beyond.aperture_mask import read_mask  # imports numpy
 
-    def _shape(self) -> ApertureShape | None:
-        shapes: dict[ApertureKind, float | Path | None] = {
-            "polygon": self.blades,
-            "ring": self.ring,
-            "cat_eye": self.cat_eye,
-            "mask": self.mask,
-        }
-        given = [kind for kind, value in shapes.items() if value is not None]
-        if len(given) > 1:
-            raise InputError("--blades, --ring, --cat-eye and --mask: give one of them")
-        if not given:
-            return None
-        from viewer.model.aperture_mask import read_mask  # imports numpy
-
-        usual = ApertureShape()
-        return ApertureShape(
-            given[0],
-            self.blades or usual.blades,
-            self.rotation or 0.0,
-            usual.ring_inner if self.ring is None else self.ring,
-            usual.cat_eye if self.cat_eye is None else self.cat_eye,
-            None if self.mask is None else read_mask(self.mask),
-        )
+            mask = read_mask(self.mask)
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        eye = given.pop("view")
+        return LensChoice(**given | {"eye": eye, "gloss": gloss_of(self.gloss), "mask": mask})
 
     def require_within(self, scene: Scene) -> None:
         """Raise InputError for a viewpoint outside the scene's views; a single view shows every viewpoint."""
@@ -365,14 +343,17 @@ class LensOptions:
 
     def notes(self, optics: Optics, scene: Scene) -> tuple[str, ...]:
         """Return a note for each value that the scene limits."""
-        pairs = {
-            "--focus": (self.focus, optics.focus_disparity),
-            "--aperture": (self.aperture, optics.aperture_diameter),
-            "--focus-range": (self.focus_range, optics.focus_range),
-        }
+        right, down = self.tilt or (None, None)
+        pairs = (
+            ("--focus", self.focus, optics.focus_disparity),
+            ("--aperture", self.aperture, optics.aperture_diameter),
+            ("--focus-range", self.focus_range, optics.focus_range),
+            ("--tilt to the right,", right, optics.focus_tilt[0]),
+            ("--tilt down,", down, optics.focus_tilt[1]),
+        )
         notes = [
             f"{name} {value:g} exceeds what the scene has; {used:g} is used."
-            for name, (value, used) in pairs.items()
+            for name, value, used in pairs
             if value not in (None, used)
         ]
         wanted = None if self.f_number is None else aperture_of(scene, self.f_number)
@@ -381,7 +362,7 @@ class LensOptions:
             notes.append(f"--f-number {self.f_number:g} is wider than the lens opens; f/{widest:.2g} is used.")
         if scene.plan is None and optics.aperture_diameter > max(scene.grid):
             notes.append("The lens is wider than the light field: what no view shows is inpainted.")
-        return tuple(notes)
+        return (*notes, *self.choice().notes(optics, scene))
 
 
 def gloss_of(path: Path | None) -> Gloss | None:

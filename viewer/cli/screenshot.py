@@ -15,7 +15,7 @@ from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.exports.full_picture import MAX_PIXELS, require_full
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.formats.lenticular import Calibration, read_calibration
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ImageSize, InputError

@@ -24,7 +24,7 @@ from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
 from iibr_core.gloss.settings import Gloss
 from iibr_core.runtime.work import report_progress
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.scenes.scene_gloss import make_maps

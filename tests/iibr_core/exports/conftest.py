@@ -9,7 +9,7 @@ import pytest
 
 from iibr_core.exports.kinds import ExportOptions, export_kind, export_path
 from iibr_core.exports.source import ExportSource, write_export
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import write_scene

@@ -18,7 +18,7 @@ from iibr_core.exports.kinds import EXPORTS, ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import open_for_export, write_export
 from iibr_core.exports.triangles import MAX_ERROR_PX, Triangles, triangulate
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape

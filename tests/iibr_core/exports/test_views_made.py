@@ -6,7 +6,7 @@ import pytest
 from iibr_core.exports.kinds import EXPORTS, ExportOptions, export_path
 from iibr_core.exports.source import ExportSource, open_for_export, write_export
 from iibr_core.scenes import opening, photo
-from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewUpdate
 from tests.viewer.conftest import write_scene

@@ -18,7 +18,8 @@ from iibr_core.exports.web_views import MAX_TEXELS, WebForm, form_that_fits
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.images.metadata import caption_in
 from iibr_core.formats.images.open_picture import read_metadata
-from iibr_core.scenes.lens_limits import LensChoice, focus_limits
+from iibr_core.scenes.lens_choice import LensChoice
+from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
 from tests.viewer.conftest import write_scene

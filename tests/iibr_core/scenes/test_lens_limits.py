@@ -4,8 +4,8 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.lens_limits import (
-    LensChoice,
     aperture_limit,
     clamp_optics,
     clamp_to_grid,

@@ -213,6 +213,14 @@ def test_values_beyond_the_scene_are_refused_or_limited_with_a_note(iibr, photo_
     assert "note: --aperture 99 exceeds what the scene has; 15 is used." in iibr(*words, "--aperture", 99).stderr
 
 
+def test_options_of_the_lens_that_would_change_nothing_are_said(iibr, photo_path, tmp_path):
+    words = ("screenshot", photo_path, "--grid", 3, "-o", tmp_path / "o.png")
+    assert "rotation 30: turns blades or a mask" in refusal_of(iibr(*words, "--rotation", 30))
+    assert "blades, ring, cat's eye and mask: give one" in refusal_of(iibr(*words, "--blades", 5, "--ring", 0.5))
+    assert "note: A closed lens shows nothing of shape;" in iibr(*words, "--blades", 5).stderr
+    assert "note: --tilt down, 99 exceeds" in iibr(*words, "--force", "--tilt", "0,99", "--aperture", 1).stderr
+
+
 def test_plan_names_size_depth_and_reasons(iibr, photo_path):
     first, *reasons = output_of(iibr("plan", photo_path)).splitlines()
     assert first == "scene: 96x64 px, disparity from scene_disparity.npy"

@@ -37,6 +37,21 @@ def test_a_drawn_kind(iibr, photo):
         assert (image.size, image.n_frames) == ((30, 20), 3)
 
 
+def test_the_lens_of_a_drawn_kind_has_the_options_of_a_screenshot(iibr, photo):
+    """A picture of a stack is the screenshot with the same lens; the place in focus does not count in a stack."""
+    lens = ("--grid", 3, "--f-number", 1.5, "--blades", 3, "--rotation", 20, "--tilt", "0.2,0.1")
+    output_of(iibr("export", photo, "--to", "focal-stack", "-o", "stack", "--frames", 1, *lens))
+    far = float(read_pfm(Path("stack/disparity.pfm")).min())
+    output_of(iibr("screenshot", photo, "-o", "shot.png", f"--focus={far}", *lens))
+    stack, shot = (np.asarray(Image.open(name)) for name in ("stack/focus_000.png", "shot.png"))
+    np.testing.assert_array_equal(stack, shot)
+    output_of(iibr("screenshot", photo, "-o", "disc.png", f"--focus={far}", *lens[:4]))
+    assert (stack != np.asarray(Image.open("disc.png"))).any(), "the shape is seen"
+    assert "--f-number: not for --to depth" in refusal_of(
+        iibr("export", photo, "--to", "depth", "-o", "d.pfm", *lens[:4])
+    )
+
+
 def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr, photo):
     words = ("export", photo, "-o", "a.html", "--for", "headset", "--to")
     for grid, views in (((), 45), (("--grid", 3), 9)):

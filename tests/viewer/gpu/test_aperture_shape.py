@@ -19,6 +19,11 @@ def is_inside(shape, t, s):
         return np.hypot(t, s) < DIAMETER / 2
     turn = np.radians(shape.rotation_deg) + 2 * np.pi * np.arange(shape.blades + 1) / shape.blades
     corner_s, corner_t = DIAMETER / 2 * np.sin(turn), -DIAMETER / 2 * np.cos(turn)  # the first on top, then clockwise
+    if shape.roundness:  # by the radius at each angle, between that of the polygon and the circle's
+        half, angle = np.pi / shape.blades, np.arctan2(s, -t) - np.radians(shape.rotation_deg)
+        beside, bend = np.mod(angle, 2 * half) - half, shape.roundness
+        radius = ((1 - bend) * np.cos(half) + bend) / ((1 - bend) * np.cos(beside) + bend)
+        return np.hypot(t, s) < DIAMETER / 2 * radius
     inside = np.ones(t.shape, bool)
     for k in range(shape.blades):
         along_s, along_t = corner_s[k + 1] - corner_s[k], corner_t[k + 1] - corner_t[k]
@@ -38,6 +43,7 @@ def share_inside(shape):
         ApertureShape(),
         ApertureShape("ring", ring_inner=0.6),
         ApertureShape("polygon", blades=11, rotation_deg=-70.0),
+        ApertureShape("polygon", blades=4, rotation_deg=20.0, roundness=0.4),
     ],
 )
 def test_openings_against_point_tests(shape):
@@ -47,6 +53,11 @@ def test_openings_against_point_tests(shape):
     decided = (expected == 0) | (expected == 1)
     assert np.abs(weights - expected)[decided].max() < 0.3, "only near the edge"
     assert weights.sum() == pytest.approx(expected.sum(), rel=0.01)
+
+
+def test_wholly_round_blades_are_a_disc():
+    rounded = opening(ApertureShape("polygon", blades=3, roundness=1.0), T, S, DIAMETER, WIDTH)
+    np.testing.assert_allclose(rounded, opening(ApertureShape(), T, S, DIAMETER, WIDTH))
 
 
 def test_mask_lies_upright_and_turns_clockwise():

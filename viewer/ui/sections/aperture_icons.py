@@ -12,6 +12,8 @@ from iibr_core.scenes.rect import Rect
 from viewer.ui.style import Palette, corners, pack_color
 
 SEGMENTS = 32
+SIDE_STEPS = 4
+"""Number of lines along a side of a polygon, which may be round."""
 MASK_CELLS = 6
 
 
@@ -24,7 +26,7 @@ def draw_shape(shape: ApertureShape, middle: tuple[float, float], radius: float,
         case "disc":
             draw.add_circle_filled(centre, radius, color, SEGMENTS)
         case "polygon":
-            draw.add_convex_poly_filled(_corners(shape, middle, radius), color)
+            draw.add_convex_poly_filled(_outline(shape, middle, radius), color)
         case "ring":
             inner = max(shape.ring_inner, 0.15)
             draw.add_circle(centre, radius * (1 + inner) / 2, color, SEGMENTS, radius * (1 - inner))
@@ -34,11 +36,15 @@ def draw_shape(shape: ApertureShape, middle: tuple[float, float], radius: float,
             _draw_mask(shape, middle, radius, palette)
 
 
-def _corners(shape: ApertureShape, middle: tuple[float, float], radius: float) -> list[Any]:
-    """Return the polygon's corners, clockwise from the top."""
-    turn = math.radians(shape.rotation_deg)
-    angles = [turn + 2 * math.pi * i / shape.blades for i in range(shape.blades)]
-    return [imgui.ImVec2(middle[0] + radius * math.sin(a), middle[1] - radius * math.cos(a)) for a in angles]
+def _outline(shape: ApertureShape, middle: tuple[float, float], radius: float) -> list[Any]:
+    """Return the outline of a polygon, clockwise from its corner on top; see `aperture_shape.opening`."""
+    half, turn, bend, points = math.pi / shape.blades, math.radians(shape.rotation_deg), shape.roundness, []
+    for i in range(shape.blades * SIDE_STEPS):
+        beside = half * (2 * (i % SIDE_STEPS) / SIDE_STEPS - 1)  # angle from the middle of the side
+        reach = radius * ((1 - bend) * math.cos(half) + bend) / ((1 - bend) * math.cos(beside) + bend)
+        angle = turn + 2 * half * i / SIDE_STEPS
+        points.append(imgui.ImVec2(middle[0] + reach * math.sin(angle), middle[1] - reach * math.cos(angle)))
+    return points
 
 
 def _lens(middle: tuple[float, float], radius: float, cut: float) -> list[Any]:

@@ -35,6 +35,7 @@ CLOSED_STOPS = 6.0
 """Length of the aperture's slider in stops, from the widest to a pinhole."""
 TILT_TIP = "Shows two handles in the picture. Drag them onto two objects to make both sharp, and all between."
 HIGHLIGHT_TIP = "Glow of bright spots, such as lamps, that are out of focus."
+ROUNDNESS_TIP = "How round the sides between the blades are. At 100 % the opening is a disc."
 KIND_TIPS: dict[ApertureKind, str] = {
     "disc": "Disc",
     "polygon": "Blades",
@@ -140,7 +141,7 @@ def _kinds(shape: ApertureShape, palette: Palette) -> list[Action]:
 
 
 def _shape_rows(shape: ApertureShape) -> ApertureShape:
-    """Build two rows for every shape, so that nothing below moves under a click; return the edited shape."""
+    """Build three rows for every shape, so that nothing below moves under a click; return the edited shape."""
     edited = shape
     if shape.kind in ("disc", "polygon"):
         blades = slider("Blades", shape.blades, BLADES_LIMITS, "%.0f", is_enabled=shape.kind == "polygon")
@@ -150,10 +151,11 @@ def _shape_rows(shape: ApertureShape) -> ApertureShape:
         edited = replace(shape, ring_inner=blocked)
     if shape.kind == "cat_eye":
         edited = replace(shape, cat_eye=slider("Cut off", shape.cat_eye, (0.0, 1.0), "%.2f"))
-    can_turn = shape.kind in ("polygon", "mask")
-    return replace(
-        edited, rotation_deg=slider("Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", "", False, can_turn)
+    roundness = percent_slider("Roundness", shape.roundness, ROUNDNESS_TIP, is_enabled=shape.kind == "polygon")
+    rotation = slider(
+        "Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", is_enabled=shape.kind in ("polygon", "mask")
     )
+    return replace(edited, roundness=roundness, rotation_deg=rotation)
 
 
 def light_section(state: AppState, scene: Scene) -> list[Action]:

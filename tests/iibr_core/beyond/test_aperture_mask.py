@@ -8,8 +8,8 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+from iibr_core.beyond.aperture_mask import MAX_SIDE, read_mask
 from iibr_core.types import InputError
-from viewer.model.aperture_mask import MAX_SIDE, read_mask
 
 
 def write(path: Path, pixels: np.ndarray, kind: str = "uint8") -> Path:
