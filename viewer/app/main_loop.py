@@ -25,7 +25,7 @@ from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
 from viewer.app.stereo_screen import StereoScreen
 from viewer.app.window import Window
-from viewer.background.maps import EntropyWork, GlossFinder, find_surface
+from viewer.background.maps import EntropyWork, GlossFinder, SurfaceWork
 from viewer.background.newest import Newest
 from viewer.background.receiver import Receiver
 from viewer.background.tracker import Tracker
@@ -74,7 +74,7 @@ class App:
         self.free_camera_view = FreeCameraView(self.scene_view, self.window.wake)
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, self.window.wake)
         self._entropy = Newest("iibr-entropy", EntropyWork(), self.window.wake)
-        self._surfaces = Newest("iibr-surface", find_surface, self.window.wake)
+        self._surfaces = Newest("iibr-surface", SurfaceWork(), self.window.wake)
         self._tracker = Tracker(self.window.wake)
         self.receiver = Receiver(self.window.wake)
         self._ui = UiHost(self.look(), self.window.handle)

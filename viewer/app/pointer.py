@@ -236,21 +236,35 @@ def _zoom(hand: _Hand) -> list[Action] | None:
 
 def _paint_actions(hand: _Hand) -> list[Action]:
     """Return the actions of a tool: it paints on the surface under the pointer, picks its depth (Ctrl), or selects it.
-    The wheel sets the size of the brush, or the tolerance of the selection.
+    The wheel sets the size of the brush, or the tolerance of the selection, which drags add to and erase from (Ctrl).
     """
     pointer, stroke, brush = hand.pointer, hand.state.stroke, hand.state.brush
     if pointer.wheel and hand.is_over_frame:
         name, factor = "tolerance" if brush.tool == "select" else "radius", BRUSH_NOTCH**pointer.wheel
         return [do(depth.set_brush, replace(brush, **{name: getattr(brush, name) * factor}))]
+    if brush.tool == "select":
+        return _selecting_actions(hand)
     begins = pointer.is_pressed and hand.began_in_frame
     if not pointer.is_down or not (begins or stroke is not None):
         return []
     place, disparity = hand.place_in_photo()
-    if brush.tool == "select":
-        return [do(selection.select, place)] if begins else []
     if stroke is None and pointer.holds_ctrl:
         return [do(depth.pick, DepthSample(place, disparity))]
     return [do(depth.paint, place)]
+
+
+def _selecting_actions(hand: _Hand) -> list[Action]:
+    """Select the surface that was clicked; a drag, or Ctrl+click, changes the selection by the brush."""
+    pointer = hand.pointer
+    if not (hand.began_in_frame and pointer.is_held):
+        return []
+    is_click = pointer.is_released and not pointer.is_drag
+    if is_click and not pointer.holds_ctrl:
+        return [do(selection.select, hand.place_in_photo()[0])]
+    if is_click or pointer.is_drag:
+        place, begins = hand.place_in_photo()[0], is_click or pointer.becomes_drag
+        return [do(selection.paint, place, erases=pointer.holds_ctrl, begins=begins)]
+    return []
 
 
 def _gloss_actions(hand: _Hand) -> list[Action]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.editing.edits import extent_of
+from iibr_core.depth.editing.edits import Stroke, extent_of
 from iibr_core.gloss.settings import Gloss
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto
@@ -18,12 +18,14 @@ from iibr_core.stages import CLOSED_FORM
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import messages
 from viewer.model.action import Action, do
-from viewer.model.selection import surface_stroke
 from viewer.model.state.inspection import ViewIndex
 from viewer.model.state.notices import Notice
 
 RANGE_PERCENTILES = 5.0, 95.0
 """Percentiles of the disparity of a surface that count as its far and near end."""
+OUTLINE_PX = 2
+INSIDE_VALUE = 110
+"""Value of a selected surface within its outline, of 255."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,33 +72,55 @@ class EntropyWork:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceRequest:
-    """A place in a photo, (x, y) as shares of its size, and the tolerance of the flood; see `Stroke`."""
+    """The stroke that would change a selected surface of a photo."""
 
-    place: tuple[float, float]
-    tolerance: float
+    stroke: Stroke
     loaded: LoadedPhoto
     plan: ScenePlan
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The surface at a place. mask: (H, W), 255 where it is. range_px: (far, near) disparity in px per view step."""
+    """A selected surface. mask: (H, W), 255 on its outline, less within, fading over its feather.
 
-    place: tuple[float, float]
+    range_px: (far, near) disparity in px per view step.
+    """
+
     mask: NDArray[np.uint8]
     range_px: tuple[float, float]
 
 
-def find_surface(request: SurfaceRequest, post: Post[Surface]) -> None:
-    """Post the surface, as the bucket would fill it."""
-    from iibr_core.depth.editing.bucket import surface_at
+class SurfaceWork:
+    """Finds selected surfaces in one thread; keeps the flood while only the brush and the feather change it."""
 
-    plan, values = request.plan, request.loaded.disparity.values
-    stroke = surface_stroke("fill", request.place, request.tolerance)
-    mask = surface_at(request.loaded.photo.pixels, values, stroke, 0, extent_of(values))
-    ends = np.percentile(values[mask], RANGE_PERCENTILES) if mask.any() else (0.0, 0.0)
-    far, near = (float(end - plan.disparity_zero) * plan.disparity_scale for end in ends)
-    post(Surface(request.place, mask * np.uint8(255), (far, near)))
+    def __init__(self) -> None:
+        self._known: tuple[LoadedPhoto, Stroke, NDArray[np.bool_]] | None = None
+
+    def __call__(self, request: SurfaceRequest, post: Post[Surface]) -> None:
+        """Post the surface that the stroke would change."""
+        from iibr_core.depth.editing.brush import falloff
+        from iibr_core.depth.editing.selected import feathered, flooded, patched
+
+        plan, loaded, stroke = request.plan, request.loaded, request.stroke
+        photo, values = loaded.photo.pixels, loaded.disparity.values
+        extent, base = extent_of(values), replace(stroke, patches=(), feather=0.0)
+        if self._known is None or self._known[0] is not loaded or self._known[1] != base:
+            self._known = loaded, base, flooded(photo, values, base, extent)
+        mask = patched(photo, self._known[2], stroke)
+        shares = falloff(feathered(values, mask, stroke, extent))
+        shown = np.where(outline_of(mask), 255, np.rint(shares * INSIDE_VALUE)).astype(np.uint8)
+        ends = np.percentile(values[mask], RANGE_PERCENTILES) if mask.any() else (0.0, 0.0)
+        far, near = (float(end - plan.disparity_zero) * plan.disparity_scale for end in ends)
+        post(Surface(shown, (far, near)))
+
+
+def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the pixels of a mask (H, W) that are up to OUTLINE_PX from those outside it; the border has no outline."""
+    inside = mask.copy()
+    for _ in range(OUTLINE_PX):
+        around = np.pad(inside, 1, mode="edge")
+        inside = inside & around[2:, 1:-1] & around[:-2, 1:-1] & around[1:-1, 2:] & around[1:-1, :-2]
+    return mask & ~inside
 
 
 class GlossFinder:

@@ -150,11 +150,11 @@ class InspectionView:
         if state.selection is None or scene is None or scene.plan is None or loaded is None:
             self._surface = self._surface_asked = None
             return None
-        asked = state.selection.place, state.brush.tolerance
+        asked = selection.surface_stroke("forward", state.selection, state.brush)
         if self._surface_asked is not None and self._surface_asked[0] == asked and self._surface_asked[1] is loaded:
             return None
         self._surface_asked = asked, loaded
-        return SurfaceRequest(*asked, loaded, scene.plan)
+        return SurfaceRequest(asked, loaded, scene.plan)
 
     def take_surface(self, result: Surface | Failed[SurfaceRequest]) -> list[Action]:
         """Show the selected surface."""

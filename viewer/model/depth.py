@@ -7,6 +7,7 @@ from math import isfinite
 
 from iibr_core.depth.editing.edits import (
     DEPTH_TOOLS,
+    FEATHER_LIMITS,
     GAMMA_LIMITS,
     MAX_POINTS,
     RADIUS_LIMITS,
@@ -154,6 +155,7 @@ def _clamp_brush(brush: Brush) -> Brush:
         radius=clamp(brush.radius, *RADIUS_LIMITS),
         strength=clamp(brush.strength, 0.0, 1.0),
         tolerance=clamp(brush.tolerance, *TOLERANCE_LIMITS),
+        feather=clamp(brush.feather, *FEATHER_LIMITS),
     )
 
 

@@ -1,14 +1,15 @@
-"""Verbs about a surface that was clicked: move it nearer or farther, or keep it sharp."""
+"""Verbs about a selected surface: change it by the brush, move it nearer or farther, or keep it sharp."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.depth.editing.edits import BrushTool, Stroke
+from iibr_core.depth.editing.edits import MAX_PATCHES, MAX_POINTS, BrushTool, Patch, Stroke
 from viewer.model import lens
 from viewer.model.history import record_edit, undoable
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import Selection
+from viewer.model.state.depth import Brush, Selection
+from viewer.model.stroke_path import longer_path
 
 MOVE_SHARE = 0.1
 """Step by which a surface is moved, as a share of the range of depth."""
@@ -31,9 +32,28 @@ def set_range(state: AppState, range_px: tuple[float, float]) -> AppState:
     return state if state.selection is None else replace(state, selection=replace(state.selection, range_px=range_px))
 
 
-def surface_stroke(tool: BrushTool, place: tuple[float, float], tolerance: float) -> Stroke:
-    """Return the stroke that changes the whole surface at a place."""
-    return Stroke(tool, (place,), HOLE_RADIUS, MOVE_SHARE, tolerance=tolerance)
+def paint(state: AppState, place: tuple[float, float], erases: bool, begins: bool) -> AppState:
+    """Add to the selection along a path of the brush, or erase from it. Without a selection, the first place makes one.
+
+    begins: whether this place begins another path.
+    """
+    if state.scene is None or (state.selection is None and erases):
+        return state
+    chosen = state.selection or Selection(place)
+    patches = chosen.patches
+    if begins or not patches:
+        patches = (*patches, Patch((place,), state.brush.radius, erases))[:MAX_PATCHES]
+    else:
+        last = patches[-1]
+        points = longer_path(last.points, place, last.radius, state.scene.size, MAX_POINTS)
+        patches = patches if points is last.points else (*patches[:-1], replace(last, points=points))
+    return state if patches is chosen.patches else replace(state, selection=replace(chosen, patches=patches))
+
+
+def surface_stroke(tool: BrushTool, chosen: Selection, brush: Brush) -> Stroke:
+    """Return the stroke that changes the whole selection."""
+    tolerance, feather = brush.tolerance, brush.feather
+    return Stroke(tool, (chosen.place,), HOLE_RADIUS, MOVE_SHARE, None, tolerance, chosen.patches, feather)
 
 
 @undoable
@@ -42,7 +62,7 @@ def move(state: AppState, is_forward: bool) -> AppState:
     if state.selection is None or state.stroke is not None:
         return state
     edits = state.depth.edits
-    stroke = surface_stroke("forward" if is_forward else "back", state.selection.place, state.brush.tolerance)
+    stroke = surface_stroke("forward" if is_forward else "back", state.selection, state.brush)
     depth = replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, stroke)))
     return replace(state, depth=depth, generation=state.generation + 1)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from iibr_core.depth.editing.brush import Window, falloff, lower_distances, smooth_within_contours
 from iibr_core.depth.editing.bucket import surface_at
 from iibr_core.depth.editing.edits import DEPTH_TOOLS, SURFACE_TOOLS, DepthEdits, Stroke, apply_tone, extent_of
+from iibr_core.depth.editing.selected import feathered, flooded, patched
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage
 
@@ -109,6 +110,10 @@ class DepthCanvas:
         """Update the distances for the stroke's point of this index. Return the window in which they changed."""
         if stroke.tool not in SURFACE_TOOLS:
             return lower_distances(self._photo, stroke, index, last.distance)
+        if stroke.tool not in DEPTH_TOOLS:
+            mask = patched(self._photo, flooded(self._photo, last.under, stroke, self._extent), stroke)
+            last.distance[:] = feathered(last.under, mask, stroke, self._extent)
+            return slice(None), slice(None)
         if _value_at(last.distance, stroke.points[index]) == 0:  # filled already
             return slice(0), slice(0)
         last.distance[surface_at(self._photo, last.under, stroke, index, self._extent)] = 0

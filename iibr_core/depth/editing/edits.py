@@ -23,11 +23,23 @@ SURFACE_TOOLS: tuple[BrushTool, ...] = ("fill", "forward", "back")
 GAMMA_LIMITS = (0.25, 4.0)
 RADIUS_LIMITS = (0.002, 0.25)
 TOLERANCE_LIMITS = (0.25, 4.0)
+FEATHER_LIMITS = (0.0, 0.1)
+MAX_PATCHES = 1000
+"""Largest number of brush paths that change one selection."""
 MAX_POINTS = 10_000
 """Largest number of points of one stroke."""
 EXTENT_PERCENTILES = (0.1, 99.9)
 """Percentiles of a map that count as its far and near end: a few wild values do not."""
 HISTOGRAM_BINS = 64
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A path of the brush that adds to a selected surface, or erases from it. points, radius: see `Stroke`."""
+
+    points: tuple[tuple[float, float], ...]
+    radius: float
+    erases: bool = False
 
 
 @dataclass(frozen=True)
@@ -38,7 +50,8 @@ class Stroke:
     photo's width. strength: 0..1, the largest change: for "nearer", "farther", "forward" and "back" as a share of the
     map's range, for "smooth" of the way to the smoothed map, for "level" and "fill" of the way to the depth that the
     map had before the stroke at the place `taken_from`, or if that is None at the first point. tolerance: factor of
-    the contrast that ends a surface, for the tools that change a surface.
+    the contrast that ends a surface, for the tools that change a surface. patches: what "forward" and "back" change
+    beside the surfaces under the points, or leave. feather: share of the photo's width over which their change fades.
     """
 
     tool: BrushTool
@@ -47,6 +60,8 @@ class Stroke:
     strength: float
     taken_from: tuple[float, float] | None = None
     tolerance: float = 1.0
+    patches: tuple[Patch, ...] = ()
+    feather: float = 0.0
 
     def radius_px(self, width: int) -> float:
         """Return the radius in pixels of a map of this width, at least one."""
@@ -95,9 +110,14 @@ def require_sound(edits: DepthEdits) -> None:
     for stroke in edits.strokes:
         if stroke.tool not in (*BRUSH_TOOLS, *SURFACE_TOOLS) or not 1 <= len(stroke.points) <= MAX_POINTS:
             raise InputError(f"depth edits: a stroke {stroke.tool!r} with {len(stroke.points)} points; paint it again")
-        checks += [("brush radius", stroke.radius, RADIUS_LIMITS), ("brush strength", stroke.strength, (0.0, 1.0))]
+        paths = [patch.points for patch in stroke.patches]
+        if len(paths) > MAX_PATCHES or not all(1 <= len(points) <= MAX_POINTS for points in paths):
+            raise InputError(f"depth edits: a selection with {len(paths)} brush paths; select it again")
+        radii = stroke.radius, *(patch.radius for patch in stroke.patches)
+        checks += [("brush radius", radius, RADIUS_LIMITS) for radius in radii]
+        checks += [("brush strength", stroke.strength, (0.0, 1.0)), ("feather", stroke.feather, FEATHER_LIMITS)]
         checks.append(("tolerance", stroke.tolerance, TOLERANCE_LIMITS))
-        places = (*stroke.points, *([stroke.taken_from] if stroke.taken_from else []))
+        places = (*stroke.points, *([stroke.taken_from] if stroke.taken_from else []), *(at for p in paths for at in p))
         checks += [("place of a stroke", at, (-inf, inf)) for place in places for at in place]
     for name, value, (low, high) in checks:
         if not (isfinite(value) and low <= value <= high):

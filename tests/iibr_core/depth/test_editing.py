@@ -14,6 +14,7 @@ from iibr_core.depth.editing.edits import (
     HISTOGRAM_BINS,
     UNEDITED,
     DepthEdits,
+    Patch,
     Stroke,
     apply_tone,
     extent_of,
@@ -96,6 +97,8 @@ def test_levels_count_every_pixel_once() -> None:
         DepthEdits(strokes=(Stroke("nearer", (), 0.1, 0.5),)),
         DepthEdits(strokes=(Stroke("carve", ((0.5, 0.5),), 0.1, 0.5),)),
         DepthEdits(strokes=(Stroke("nearer", ((0.5, np.inf),), 0.1, 0.5),)),
+        DepthEdits(strokes=(Stroke("back", ((0.5, 0.5),), 0.1, 0.5, patches=(Patch((), 0.1),)),)),
+        DepthEdits(strokes=(Stroke("back", ((0.5, 0.5),), 0.1, 0.5, feather=np.inf),)),
     ],
 )
 def test_edits_that_make_no_sense_are_refused(edits) -> None:
@@ -240,6 +243,24 @@ def grey_photo(color: float = 0.4) -> np.ndarray:
 def filled(photo, x=0.1, y=0.5, radius=0.03, disparity=None, **changes):
     disparity = np.zeros(photo.shape[:2], np.float32) if disparity is None else disparity
     return surface_at(photo, disparity, Stroke("fill", ((x, y),), radius, 1.0, **changes), 0, (0.0, 1.0))
+
+
+def test_a_selection_follows_the_brush_and_its_feather_fades_up_to_a_depth_edge() -> None:
+    photo, disparity = grey_photo(), np.zeros((ROWS, COLUMNS), np.float32)
+    photo[20:40, 20:40] = 0.9
+    disparity[:, 43:] = 10.0
+    added, erased = Patch(((0.1, 0.1),), 0.05), Patch(((0.25, 0.4),), 0.05, erases=True)
+    stroke = Stroke("forward", ((0.4, 0.5),), 0.03, 0.3, patches=(added, erased), feather=0.1)
+    change = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,))) - disparity
+    assert change[30, 35] == pytest.approx(3.0)
+    assert change[6, 8] == pytest.approx(3.0), "added"
+    assert change[24, 20] < 3.0, "erased"
+    assert np.all(np.diff(change[30, 8:18]) >= 0), "fades"
+    assert 0 < change[30, 16] < 3.0
+    assert change[30, 41] > 0
+    np.testing.assert_array_equal(change[:, 43:], 0)
+    sharp = apply_edits(photo, disparity, DepthEdits(strokes=(replace(stroke, feather=0.0),))) - disparity
+    assert set(np.unique(sharp).tolist()) == {0.0, 3.0}
 
 
 def test_an_edge_of_the_photo_or_of_the_map_ends_it() -> None:

@@ -10,7 +10,15 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
-from iibr_core.depth.editing.edits import DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits, Stroke
+from iibr_core.depth.editing.edits import (
+    DEPTH_TOOLS,
+    GAMMA_LIMITS,
+    RADIUS_LIMITS,
+    BrushTool,
+    DepthEdits,
+    Patch,
+    Stroke,
+)
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan
 from iibr_core.scenes.scene import DepthSettings, Source
 from iibr_core.training.degradation import blur
@@ -131,7 +139,9 @@ def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
     drag = replace(at, is_down=True, drag_distance=50.0)
     assert actions_from_pointer(drag, layout, state, lambda x, y: 0.0) == [], "it began elsewhere"
     selecting = replace(state, brush=replace(state.brush, tool="select"))
-    (select,) = actions_from_pointer(pressed, layout, selecting, lambda x, y: 3.0)
+    assert actions_from_pointer(pressed, layout, selecting, lambda x, y: 3.0) == [], "it may become a drag"
+    released = replace(at, is_released=True)
+    (select,) = actions_from_pointer(released, layout, selecting, lambda x, y: 3.0)
     assert (select.verb, select.args) == (selection.select, paint.args)
     (wider,) = actions_from_pointer(replace(at, wheel=1.0), layout, selecting, lambda x, y: None)
     assert reduce(selecting, wider).brush.tolerance > 1
@@ -228,6 +238,21 @@ def test_depth_that_comes_for_the_next_photo_leaves_its_focus() -> None:
     new_depth = NewDepth((0.0, 1.5) if shown.focused_at is not None else None)
     deep = opening.show_scene(shown, shown.generation, replace(scene, disparity_range_px=(-4.0, 4.0)), new_depth)
     assert (deep.optics.focus_disparity, deep.chosen_focus) == (0.0, None)
+
+
+def test_drags_add_to_a_selection_and_erase_from_it() -> None:
+    state = replace(opened(), brush=Brush("select", radius=0.06, feather=0.02, is_on=True))
+    assert selection.paint(state, (0.5, 0.5), erases=True, begins=True).selection is None, "nothing to erase from"
+    for place, erases, begins in (
+        ((0.5, 0.5), False, True),
+        ((0.6, 0.5), False, False),
+        ((0.1, 0.1), True, True),
+        ((0.2, 0.1), False, False),
+    ):
+        state = selection.paint(state, place, erases, begins)
+    added, erased = Patch(((0.5, 0.5), (0.6, 0.5)), 0.06), Patch(((0.1, 0.1), (0.2, 0.1)), 0.06, erases=True)
+    (stroke,) = selection.move(state, is_forward=False).depth.edits.strokes
+    assert stroke == Stroke("back", ((0.5, 0.5),), 0.03, 0.1, patches=(added, erased), feather=0.02)
 
 
 def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> None:

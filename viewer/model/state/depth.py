@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool, Patch
 
 Tool = BrushTool | Literal["select"]
 TOOLS: tuple[Tool, ...] = (*BRUSH_TOOLS, "select")
@@ -22,7 +22,7 @@ class DepthSample:
 
 @dataclass(frozen=True)
 class Brush:
-    """The tool for the picture while it is on. radius, strength, tolerance: see `Stroke`.
+    """The tool for the picture while it is on. radius, strength, tolerance, feather: see `Stroke`.
 
     sample: source of the depth that "level" and "fill" paint, None: the beginning of the stroke. brought_overlay:
     whether the depth overlay came with the brush, and goes with it.
@@ -32,6 +32,7 @@ class Brush:
     radius: float = 0.03
     strength: float = 0.25
     tolerance: float = 1.0
+    feather: float = 0.0
     is_on: bool = False
     sample: DepthSample | None = None
     brought_overlay: bool = False
@@ -39,10 +40,11 @@ class Brush:
 
 @dataclass(frozen=True)
 class Selection:
-    """A surface that was clicked. place: (x, y) as shares of the photo's width and height.
+    """A surface that was clicked. place: (x, y) as shares of the photo's width and height. patches: see `Stroke`.
 
     range_px: (far, near) disparity of the surface, in px per view step; None until the surface was found.
     """
 
     place: tuple[float, float]
+    patches: tuple[Patch, ...] = ()
     range_px: tuple[float, float] | None = None

@@ -34,7 +34,7 @@ def draw_marks(state: AppState, scene: Scene, layout: Layout, picture: Rect, fra
     draw.push_clip_rect(*corners(frame), True)
     if state.tilt_handles is not None:
         _draw_handles(state.tilt_handles, scale, picture)
-    if brush.is_on and brush.tool != "select" and scene.plan is not None:
+    if brush.is_on and scene.plan is not None:
         _draw_sample(state, scene, scale, picture)
         if hover is not None:
             x, y = _pointed_at(hover, scene, picture)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing.edits import DEPTH_TOOLS, RADIUS_LIMITS, TOLERANCE_LIMITS
+from iibr_core.depth.editing.edits import DEPTH_TOOLS, FEATHER_LIMITS, RADIUS_LIMITS, TOLERANCE_LIMITS
 from viewer.model import depth, selection
 from viewer.model.action import Action, do
 from viewer.model.commands import BRUSH_WORDS
@@ -20,13 +20,14 @@ TOOL_TIPS: dict[Tool, str] = {
     "smooth": "Drag over the picture to smooth its depth, along the photo's edges.",
     "level": "Drag over the picture to give it one depth, up to the photo's edges.",
     "fill": "Click a surface to give it one depth, up to edges of the photo and of depth.",
-    "select": "Click a subject to select its surface. Then move it nearer or farther, or keep it sharp.",
+    "select": "Click a subject to select it. Drag to add to it, Ctrl+drag to erase. Then move it, or keep it sharp.",
 }
 TOOLS = {tool: (BRUSH_WORDS[tool], f"{tip} B or Esc puts the tool away.") for tool, tip in TOOL_TIPS.items()}
 TOOLS_A_ROW = 3
 SIZE_TIP = "Width of the brush as a share of the photo's width (wheel over the picture)."
 STRENGTH_TIP = "Change of depth by one stroke. Level and Bucket always give the whole depth."
 TOLERANCE_TIP = "Contrast that ends a surface: higher values select more (wheel over the picture)."
+FEATHER_TIP = "Width over which a move of the selected surface fades out beside it, where no depth edge lies."
 SAMPLE_TIP = "Level and Bucket paint the depth where you press. Ctrl+click picks another depth; this forgets it."
 SURFACE_BUTTONS = (
     ("Nearer##surface", "Bring the selected surface nearer by a tenth of the depth.", do(selection.move, True)),
@@ -53,14 +54,15 @@ def brush_rows(state: AppState) -> list[Action]:
 def _settings(brush: Brush) -> Brush:
     """Build the settings; return the edited brush."""
     paints, is_depth_tool = brush.is_on and brush.tool != "select", brush.tool in DEPTH_TOOLS
-    floods = brush.is_on and brush.tool in ("fill", "select")
+    selects, floods = brush.is_on and brush.tool == "select", brush.is_on and brush.tool in ("fill", "select")
     edited = replace(
         brush,
-        radius=percent_slider("Size", brush.radius, SIZE_TIP, paints, RADIUS_LIMITS, "%.1f %%", True),
+        radius=percent_slider("Size", brush.radius, SIZE_TIP, brush.is_on, RADIUS_LIMITS, "%.1f %%", True),
         strength=percent_slider("Strength", brush.strength, STRENGTH_TIP, paints and not is_depth_tool),
         tolerance=percent_slider(
             "Tolerance", brush.tolerance, TOLERANCE_TIP, floods, TOLERANCE_LIMITS, is_logarithmic=True
         ),
+        feather=percent_slider("Feather", brush.feather, FEATHER_TIP, selects, FEATHER_LIMITS, "%.1f %%"),
     )
     has_sample = paints and is_depth_tool and brush.sample is not None
     return replace(edited, sample=None) if button("Clear the picked depth", SAMPLE_TIP, has_sample) else edited
