@@ -24,8 +24,7 @@ from viewer.model.state.notices import Notice
 RANGE_PERCENTILES = 5.0, 95.0
 """Percentiles of the disparity of a surface that count as its far and near end."""
 OUTLINE_PX = 2
-INSIDE_VALUE = 110
-"""Value of a selected surface within its outline, of 255."""
+"""Width of the outline of a selected surface, in pixels of the photo."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,37 +80,31 @@ class SurfaceRequest:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A selected surface. mask: (H, W), 255 on its outline, less within, fading over its feather.
+    """A selected surface. outline: (H, W), 255 on it. range_px: (far, near) disparity in px per view step."""
 
-    range_px: (far, near) disparity in px per view step.
-    """
-
-    mask: NDArray[np.uint8]
+    outline: NDArray[np.uint8]
     range_px: tuple[float, float]
 
 
 class SurfaceWork:
-    """Finds selected surfaces in one thread; keeps the flood while only the brush and the feather change it."""
+    """Finds selected surfaces in one thread; keeps the flood while only the brush changes the selection."""
 
     def __init__(self) -> None:
         self._known: tuple[LoadedPhoto, Stroke, NDArray[np.bool_]] | None = None
 
     def __call__(self, request: SurfaceRequest, post: Post[Surface]) -> None:
         """Post the surface that the stroke would change."""
-        from iibr_core.depth.editing.brush import falloff
-        from iibr_core.depth.editing.selected import feathered, flooded, patched
+        from iibr_core.depth.editing.selected import flooded, patched
 
         plan, loaded, stroke = request.plan, request.loaded, request.stroke
         photo, values = loaded.photo.pixels, loaded.disparity.values
-        extent, base = extent_of(values), replace(stroke, patches=(), feather=0.0)
+        base = replace(stroke, patches=())
         if self._known is None or self._known[0] is not loaded or self._known[1] != base:
-            self._known = loaded, base, flooded(photo, values, base, extent)
+            self._known = loaded, base, flooded(photo, values, base, extent_of(values))
         mask = patched(photo, self._known[2], stroke)
-        shares = falloff(feathered(values, mask, stroke, extent))
-        shown = np.where(outline_of(mask), 255, np.rint(shares * INSIDE_VALUE)).astype(np.uint8)
         ends = np.percentile(values[mask], RANGE_PERCENTILES) if mask.any() else (0.0, 0.0)
         far, near = (float(end - plan.disparity_zero) * plan.disparity_scale for end in ends)
-        post(Surface(shown, (far, near)))
+        post(Surface(outline_of(mask) * np.uint8(255), (far, near)))
 
 
 def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

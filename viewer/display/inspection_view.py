@@ -36,7 +36,7 @@ from viewer.model.state.notices import Notice
 
 MASK_COLORS = {"inpainted": (255, 184, 60), "surface": (80, 240, 220)}
 """Colours (sRGB bytes) of overlays that are masks."""
-SURFACE_OPACITY = 0.6
+SURFACE_OPACITY = 0.9
 MAX_BRUSH_OPACITY = 0.5
 """Largest opacity of overlays while a brush is in hand."""
 SNAPSHOT_BUDGET_S = 0.025
@@ -236,7 +236,7 @@ class InspectionView:
         """Return the map to be shown; None if there is none, or not yet."""
         kind, field, entropy = frame.state.inspection.overlay, frame.field, self._entropy
         if frame.state.selection is not None and self._surface is not None:
-            return _OverlayValues("surface", field.grid.centre, self._surface.mask)
+            return _OverlayValues("surface", field.grid.centre, self._surface.outline)
         if kind is None or (kind != "disparity" and field.is_single):
             return None
         if kind == "entropy":

@@ -16,6 +16,9 @@ MOVE_SHARE = 0.1
 HOLE_RADIUS = 0.03
 """Radius of the largest hole in a surface that is selected with it, as a share of the photo's width."""
 
+NOWHERE = (-1.0, -1.0)
+"""A place outside the photo: no surface is found there."""
+
 
 def select(state: AppState, place: tuple[float, float]) -> AppState:
     """Select the surface at a place, (x, y) as shares of the photo's width and height."""
@@ -33,13 +36,13 @@ def set_range(state: AppState, range_px: tuple[float, float]) -> AppState:
 
 
 def paint(state: AppState, place: tuple[float, float], erases: bool, begins: bool) -> AppState:
-    """Add to the selection along a path of the brush, or erase from it. Without a selection, the first place makes one.
+    """Add to the selection along a path of the brush, or erase from it. Without a selection, the path is one.
 
     begins: whether this place begins another path.
     """
     if state.scene is None or (state.selection is None and erases):
         return state
-    chosen = state.selection or Selection(place)
+    chosen = state.selection or Selection(place, is_painted=True)
     patches = chosen.patches
     if begins or not patches:
         patches = (*patches, Patch((place,), state.brush.radius, erases))[:MAX_PATCHES]
@@ -52,8 +55,8 @@ def paint(state: AppState, place: tuple[float, float], erases: bool, begins: boo
 
 def surface_stroke(tool: BrushTool, chosen: Selection, brush: Brush) -> Stroke:
     """Return the stroke that changes the whole selection."""
-    tolerance, feather = brush.tolerance, brush.feather
-    return Stroke(tool, (chosen.place,), HOLE_RADIUS, MOVE_SHARE, None, tolerance, chosen.patches, feather)
+    tolerance, feather, place = brush.tolerance, brush.feather, NOWHERE if chosen.is_painted else chosen.place
+    return Stroke(tool, (place,), HOLE_RADIUS, MOVE_SHARE, None, tolerance, chosen.patches, feather)
 
 
 @undoable

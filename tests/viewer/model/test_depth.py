@@ -252,7 +252,7 @@ def test_drags_add_to_a_selection_and_erase_from_it() -> None:
         state = selection.paint(state, place, erases, begins)
     added, erased = Patch(((0.5, 0.5), (0.6, 0.5)), 0.06), Patch(((0.1, 0.1), (0.2, 0.1)), 0.06, erases=True)
     (stroke,) = selection.move(state, is_forward=False).depth.edits.strokes
-    assert stroke == Stroke("back", ((0.5, 0.5),), 0.03, 0.1, patches=(added, erased), feather=0.02)
+    assert stroke == Stroke("back", (selection.NOWHERE,), 0.03, 0.1, patches=(added, erased), feather=0.02)
 
 
 def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> None:

@@ -40,11 +40,13 @@ class Brush:
 
 @dataclass(frozen=True)
 class Selection:
-    """A surface that was clicked. place: (x, y) as shares of the photo's width and height. patches: see `Stroke`.
+    """A surface that was clicked or painted. place: (x, y) as shares of the photo's width and height.
 
+    patches: see `Stroke`. is_painted: whether only they count, not the surface at the place.
     range_px: (far, near) disparity of the surface, in px per view step; None until the surface was found.
     """
 
     place: tuple[float, float]
     patches: tuple[Patch, ...] = ()
+    is_painted: bool = False
     range_px: tuple[float, float] | None = None

@@ -20,7 +20,7 @@ TOOL_TIPS: dict[Tool, str] = {
     "smooth": "Drag over the picture to smooth its depth, along the photo's edges.",
     "level": "Drag over the picture to give it one depth, up to the photo's edges.",
     "fill": "Click a surface to give it one depth, up to edges of the photo and of depth.",
-    "select": "Click a subject to select it. Drag to add to it, Ctrl+drag to erase. Then move it, or keep it sharp.",
+    "select": "Click a subject, or paint it. Drag to add to it, Ctrl+drag to erase. Then move it, or keep it sharp.",
 }
 TOOLS = {tool: (BRUSH_WORDS[tool], f"{tip} B or Esc puts the tool away.") for tool, tip in TOOL_TIPS.items()}
 TOOLS_A_ROW = 3
