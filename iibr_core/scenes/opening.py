@@ -2,29 +2,26 @@
 
 import itertools
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from iibr_core.beyond.hidden_surfaces import HiddenSurface, SeenBehind, hidden_surface
-from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.cameras import infinity_of
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.method.disparity_range import measure_disparity_range
-from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.compiling import working_clock
 from iibr_core.runtime.machine import give_back_memory
-from iibr_core.runtime.tiling import THREADS
 from iibr_core.runtime.time_left import TimeLeft
-from iibr_core.runtime.work import Cancelled, is_stopped
-from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.runtime.work import is_stopped
+from iibr_core.scenes.outer_views import OuterViews
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, sketch_photo, views_of_photo
 from iibr_core.scenes.scene import (
     READING,
@@ -148,32 +145,13 @@ def _results_of_light_field(request: SceneRequest, wanted: Wanted) -> Iterator[S
 
 def _with_hidden(results: Iterator[SceneReady | ViewReady]) -> Iterator[SceneReady | ViewReady]:
     """Yield results, with the surface behind the centre view's once the outer views of a scene are there."""
-    ready: SceneReady | None = None
-    seen = dict[tuple[int, int], SeenBehind]()
+    centre: ViewUpdate | None = None
     for result in results:
         if isinstance(result, SceneReady):
-            ready, seen = result, {}
-        elif ready is not None and (disparity := result.view.disparity) is not None and result.view.is_final:
-            scene, view = ready.scene, result.view
-            outer = {scene.grid.index_of(at) for at in outer_views_of_grid(scene.grid)}
-            place = view.row, view.column
-            if place in outer:
-                at = scene.viewpoint(*place)
-                seen[place] = SeenBehind(at, view.colors, disparity, view.inpainted if scene.plan else None)
-            if seen.keys() == outer and (place in outer or not outer):
-                result = replace(result, hidden=_hidden_of(ready, seen.values()))
+            centre, outer = result.centre, OuterViews(result.scene)
+        elif centre is not None and outer.take(result.view):
+            result = replace(result, hidden=outer.hidden_behind(centre))
         yield result
-
-
-def _hidden_of(ready: SceneReady, seen: Iterable[SeenBehind]) -> HiddenSurface | None:
-    """Return the surface behind the centre view's, None if it has no disparity or the work is stopped."""
-    disparity = ready.centre.disparity
-    if disparity is None:
-        return None
-    with suppress(Cancelled):
-        colors = np.ascontiguousarray(encoded_from_stored(ready.centre.colors), np.float32)
-        return hidden_surface(colors, disparity, aperture_limit(ready.scene) / 2, seen, THREADS)
-    return None
 
 
 def _count_views(
