@@ -2,8 +2,7 @@
 // The picture of a pinhole camera, which up to four stored views answer, each warped by its own disparity. Views without
 // disparity give the picture of an open lens, too: their mean, in linear light, sheared to the focus.
 // WARP: some views have disparity. NEAR: all answering views are near their cameras. DOLLY: the rays of different pixels
-// cross the grid at different places. SEEN: disparity in place of light. SUMMED: of an open lens' cameras, added up, as web
-// pages do; each is blurred by its own share of the aperture.
+// cross the grid at different places. SEEN: disparity in place of light.
 #include "first_hit.glsl"
 #include "gloss.glsl"
 
@@ -16,9 +15,6 @@ layout(std140) uniform Samples {
     vec4 numbers[MAX_SAMPLES];  // x: layer; y: 1 = has disparity; z: weight
 };
 uniform int sample_count;
-#ifdef SUMMED
-uniform float cell_views;     // side of the square of the aperture that a camera stands for, view steps
-#endif
 uniform vec4 field_part;      // of the picture that the views show: left, top, width, height
 uniform vec2 pixel_uv;        // size of a pixel, texture coordinates of the views
 #ifdef DOLLY
@@ -86,12 +82,7 @@ void main() {
 #ifdef SEEN
         sum = vec4(seen.disparity);
 #else
-#ifdef SUMMED
-        float beside = max(abs(seen.disparity - focus) - focus_range, 0.0);
-        vec4 light = mean_light_at(seen.at, answer.layer, cell_views * beside);
-#else
         vec4 light = light_at(seen.at, answer.layer);
-#endif
 #ifdef GLOSS
         vec2 ray = eye + dolly * (place - 0.5) + cameras[i].xy;
         light.rgb = glossy(light.rgb, seen.at, ray + answer.to_view, light.a, ray);

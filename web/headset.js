@@ -1,15 +1,15 @@
 // Shows the picture in a headset (WebXR) as a window that stands upright before the head. The surface in focus lies in
 // the window's plane. The cameras lie in a plane DISTANCE_M before it: there a ray from the eye finds its view.
 
-import { NUMBERS, clamp, ends, fraction, hash, pick, samplesOf } from "./renderer.js";
+import { ends, hash, pick } from "./lens.js";
+import { clamp } from "./slices.js";
 import { $, say } from "./views.js";
 
 const DISTANCE_M = 1.5, SIDE_M = 1.2, NEAREST_M = 0.1;  // from the head to the window; its longer side
 const EYES_M = 0.063, HEAD_M = 0.1;  // distance between the eyes, and how far the head moves within the grid
 const MOST_MARGIN = 0.3;  // share of the picture that is cropped
-const MOST_PX = 6e5, MOST_SCALE = 2;  // of an eye's picture, which is drawn in one pass
+const MOST_PX = 6e5, MOST_SCALE = 2, OPEN_SCALE = 0.7;  // of an eye's picture, which is drawn in one pass; of an open lens'
 const DRAG = 0.03, EASE = 0.2;  // of a hand, in windows, that opens no aperture; share of a change of focus, per frame
-const CORNERS = [[0, 0], [1, 0], [0, 1], [1, 1]];
 
 const limited = (x, limit) => clamp(x, -limit, limit);
 
@@ -57,7 +57,7 @@ class Headset {
         this.whole = views.map((side) => SIDE_M * side / Math.max(...views));
         const scale = Math.min(MOST_SCALE, Math.sqrt(MOST_PX / views[0] / views[1]));
         this.px = views.map((side) => Math.max(Math.round(scale * side), 1));
-        this.nearest = renderer.texture(gl.TEXTURE_2D, gl.RGBA32F, gl.NEAREST, field.columns, field.rows);
+        renderer.nearest = renderer.texture(gl.TEXTURE_2D, gl.RGBA32F, gl.NEAREST, field.columns, field.rows);
         gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, field.columns, field.rows, gl.RGBA, gl.FLOAT, nearestViews(field));
         local.addEventListener("reset", () => (this.space = null));
         session.addEventListener("selectstart", ({ frame, inputSource }) => this.select(frame, inputSource));
@@ -83,19 +83,14 @@ class Headset {
 
     // Draws an eye's picture, in one pass, and the window with it.
     draw(view, { eye, dolly, part, size }, pointed) {
-        const { page: { renderer, field, optics: { aperture } }, nearest } = this, { gl } = renderer;
-        renderer.begin({ eye, focus: this.focus, aperture }, part, ...this.px);
-        const { lens } = renderer.picture, [down, across] = NUMBERS.SQRT_STEPS;
-        const cameras = aperture > 0 ? samplesOf(lens, { ...field, hasDisparity: true }, 0)
-            : CORNERS.map((corner) => ({ t: 0, s: 0, view: { t: 0, s: 0 }, weight: 1, answer: [...corner, 1] }));
-        const samples = cameras.map((one, i) => ({ answer: [fraction(i, across), fraction(i, down), 0], ...one }));
-        const inGrid = [eye.s + (field.columns >> 1), eye.t + (field.rows >> 1)];
-        renderer.pass(samples, ["DOLLY"], { dolly, eye_in_grid: inGrid }, { nearest_views: [gl.TEXTURE_2D, nearest] });
+        const { page: { renderer, optics }, focus } = this, scale = optics.aperture > 0 ? OPEN_SCALE : 1;
+        renderer.begin({ ...optics, eye, focus, dolly }, part, ...this.px.map((side) => Math.round(scale * side)));
+        renderer.drawFirst();
         const { transform: { inverse }, projectionMatrix } = view, layer = this.session.renderState.baseLayer;
         const { x, y, width, height } = layer.getViewport(view), { framebuffer } = layer;
         const values = { "to_eye[0]": [...inverse.matrix], "to_clip[0]": [...projectionMatrix], size, pointed };
-        const textures = { light_sum: [gl.TEXTURE_2D, renderer.target.texture] };
-        renderer.draw("window.frag", [], { framebuffer, x, y, width, height }, values, textures);
+        const target = { framebuffer, x, y, width, height }, textures = { light_sum: renderer.light };
+        renderer.draw(["window.frag"], target, values, textures, "window.vert");
     }
 
     // Returns the space of a window that stands upright before the head: x right, y up, z towards the head.

@@ -4,4 +4,5 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
+precision highp usampler2D;
 #define DISPARITY_IN_ALPHA 1

@@ -1,6 +1,6 @@
 // Turns of a device that a hand holds, from the events of its orientation.
 
-import { clamp } from "./renderer.js";
+import { clamp } from "./slices.js";
 
 const NOISE_DEG = 0.4;  // Largest turn that leaves the picture as it is.
 

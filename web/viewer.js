@@ -1,7 +1,9 @@
 // The page: moves the lens by touch, mouse and keys.
 
 import { enterHeadset, offerHeadset } from "./headset.js";
-import { NUMBERS, Renderer, WHOLE, clamp, pick } from "./renderer.js";
+import { WHOLE, pick } from "./lens.js";
+import { Renderer } from "./renderer.js";
+import { NUMBERS, clamp } from "./slices.js";
 import { Tilt } from "./tilt.js";
 import { $, load, say } from "./views.js";
 
@@ -10,6 +12,7 @@ const TAP_MS = 350, TAP_PX = 8, DOUBLE_TAP_PX = 30;  // Longest time between two
 const LINE_PX = 33, NOTCH_PX = 100;  // Scrolling by a line, and by a notch of a plain wheel.
 const TILT_DEG = 20;  // Turn of a device that leads to the outermost view.
 const DETAIL = 2, MOST_SIDE_PX = 4096;  // Largest number of drawn pixels: for a pixel of a view; of the longer side.
+const CLOSED_STOPS = 6;  // Length of the aperture's slider in stops, from the widest to a pinhole.
 const SLOW_MS = 45, QUICK_MS = 24;  // Time of a frame, while the hand moves, above and below which quality changes.
 
 function hint(text) {
@@ -21,14 +24,22 @@ class Page {
     constructor(field) {
         const canvas = $("view"), still = matchMedia("(prefers-reduced-motion: reduce)").matches;
         Object.assign(this, { field, canvas, part: WHOLE, level: 0, changed: true, drawnAt: 0, moves: 0 });
-        this.optics = { eye: { t: 0, s: 0 }, focus: field.focus, aperture: field.aperture };
+        this.optics = { eye: { t: 0, s: 0 }, ...field.optics };
         this.swings = !still && field.order.length > 1;
         this.pointers = new Map();
         this.focusStep = (field.focusLimits[1] - field.focusLimits[0]) / FOCUS_STEPS;
-        for (const name of ["focus", "aperture"]) {
-            [$(name).min, $(name).max] = field[`${name}Limits`];
-            $(name).addEventListener("input", () => this.set({ [name]: $(name).valueAsNumber }));
+        const limits = { focus: field.focusLimits, aperture: [0, CLOSED_STOPS], range: field.rangeLimits, highlights: [0, 1] };
+        for (const [name, ends] of Object.entries(limits)) {
+            [$(name).min, $(name).max] = ends;
+            $(name).addEventListener("input", () => {
+                const value = $(name).valueAsNumber;
+                this.set({ [name]: name === "aperture" ? this.opened(value) : value });
+            });
         }
+        $("shape").addEventListener("change", ({ target: { value } }) => {
+            const [kind, blades] = value.split(" "), { shape } = this.optics;
+            this.set({ shape: { ...shape, kind, blades: Number(blades) || shape.blades } });
+        });
         new ResizeObserver(() => this.wake()).observe(canvas);
         canvas.addEventListener("lostpointercapture", ({ pointerId }) => this.pointers.delete(pointerId));
         for (const name of ["pointerdown", "pointermove", "pointerup", "wheel"]) {
@@ -47,27 +58,48 @@ class Page {
 
     // Changes the optics; a hand's change ends the swing.
     set(changes, isHand = true) {
-        const { eyeLimits: { t, s }, focusLimits, apertureLimits } = this.field;
+        const { eyeLimits: { t, s }, focusLimits, apertureLimits, rangeLimits } = this.field;
         const wanted = { ...this.optics, ...changes };
         this.swings &&= !isHand || !Object.keys(changes).length;
         this.optics = {
             eye: { t: clamp(wanted.eye.t, ...t), s: clamp(wanted.eye.s, ...s) },
             focus: clamp(wanted.focus, ...focusLimits), aperture: clamp(wanted.aperture, ...apertureLimits),
+            range: clamp(wanted.range, ...rangeLimits), highlights: clamp(wanted.highlights, 0, 1),
+            shape: wanted.shape, tilt: wanted.tilt,
         };
+        const { aperture, shape: { kind, blades } } = this.optics;
         for (const [name, words] of Object.entries(this.words())) {
-            $(name).value = this.optics[name];
+            $(name).value = name === "aperture" ? this.stops(aperture) : this.optics[name];
             $(name).setAttribute("aria-valuetext", words);
         }
+        $("shape").value = kind === "polygon" ? `polygon ${blades}` : kind;
+        $("stop").value = aperture ? this.fNumber() : "all sharp";
         this.wake();
+    }
+
+    // Returns the place of an aperture on its slider, and the aperture at a place: in stops, as on the ring of a lens.
+    stops(aperture) {
+        return aperture ? Math.max(CLOSED_STOPS + Math.log2(aperture / this.field.apertureLimits[1]), 0) : 0;
+    }
+
+    opened(stops) {
+        return stops > 0 ? this.field.apertureLimits[1] * 2 ** (Math.min(stops, CLOSED_STOPS) - CLOSED_STOPS) : 0;
+    }
+
+    fNumber() {
+        const { field: { unitFNumber: unit, isExactFNumber }, optics: { aperture } } = this;
+        return unit ? `${isExactFNumber ? "" : "≈ "}f/${(unit / aperture).toFixed(1)}` : `${aperture.toFixed(1)} views`;
     }
 
     // Returns what a screen reader says of each slider.
     words() {
-        const { focus, aperture } = this.optics, [far, near] = this.field.focusLimits;
-        const share = Math.round(100 * (focus - far) / (near - far || 1));
+        const { focus, aperture, range, highlights } = this.optics, [far, near] = this.field.focusLimits;
+        const percent = (part, whole = 1) => `${Math.round(100 * part / (whole || 1))} %`;
         return {
-            focus: `${share} % of the way from far to near, disparity ${focus.toFixed(2)} pixels`,
-            aperture: aperture ? `${aperture.toFixed(1)} view steps wide` : "closed, everything is sharp",
+            focus: `${percent(focus - far, near - far)} of the way from far to near, disparity ${focus.toFixed(2)} pixels`,
+            aperture: aperture ? this.fNumber() : "closed, everything is sharp",
+            range: range ? `± ${percent(range, near - far)} of the depth` : "none",
+            highlights: percent(highlights),
         };
     }
 
@@ -89,12 +121,11 @@ class Page {
             this.level = clamp(this.level + change, 0, NUMBERS.LEVELS.length - 1);
             const level = NUMBERS.LEVELS[this.changed ? this.level : 0];
             renderer.begin(this.optics, this.part, ...this.size(level.scale), level);
+            this.steps = renderer.steps(this.changed);
             this.isBest = level === NUMBERS.LEVELS[0];
             [this.drawnAt, this.changed] = [now, false];
         }
-        if (renderer.picture.pass < renderer.picture.passes) {
-            renderer.step();
-        } else if (this.isBest && !this.swings) {
+        if (this.steps.next().done && this.isBest && !this.swings) {
             document.documentElement.dataset.state = "still";
             return;
         }
@@ -188,6 +219,7 @@ class Page {
         const { optics: { eye, focus, aperture }, focusStep: step } = this;
         const { canvas: { clientWidth, clientHeight } } = this, middle = { x: clientWidth / 2, y: clientHeight / 2 };
         const far = event.shiftKey ? 1 : 0.25, focused = (steps) => () => this.set({ focus: focus + steps * step });
+        const opened = (stops) => () => this.set({ aperture: this.opened(this.stops(aperture) + stops) });
         const moved = (t, s) => () => this.set({ eye: { t: eye.t + far * t, s: eye.s + far * s } });
         const ofPicture = {
             ArrowLeft: moved(0, -1), ArrowRight: moved(0, 1), ArrowUp: moved(-1, 0), ArrowDown: moved(1, 0),
@@ -195,7 +227,7 @@ class Page {
         };
         const ofPage = {
             "+": focused(1), "=": focused(1), "-": focused(-1),
-            "]": () => this.set({ aperture: aperture + 0.5 }), "[": () => this.set({ aperture: aperture - 0.5 }),
+            "]": opened(0.5), "[": opened(-0.5),
             f: () => event.repeat || this.full(), s: () => event.repeat || this.save(), r: () => this.reset(),
         };
         const action = ofPage[event.key.toLowerCase()] ?? (event.target.type !== "range" && ofPicture[event.key]);
@@ -212,7 +244,7 @@ class Page {
 
     reset() {
         this.part = WHOLE;
-        this.set({ eye: { t: 0, s: 0 }, focus: this.field.focus, aperture: this.field.aperture });
+        this.set({ eye: { t: 0, s: 0 }, ...this.field.optics });
     }
 
     full() {
@@ -231,6 +263,7 @@ class Page {
         });
     }
 
+    lens = () => $("lens").showPopover?.();
     headset = () => enterHeadset(this);
 
     // Starts or stops moving the viewpoint by the device's tilt.

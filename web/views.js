@@ -1,12 +1,12 @@
 // Reads the views that a page carries, and hands them to the renderer: streams of VP9 (web_streams.py), or moving
 // pictures in AVIF.
 
-import { hash } from "./renderer.js";
+import { hash } from "./lens.js";
 
 export const $ = (id) => document.getElementById(id);
 export const say = (text) => ($("status").textContent = text);
 
-const RATE = 25, SEEK_MS = 10000;
+const RATE = 25, SEEK_MS = 10000, SAMPLE_SIZE = 8192;
 const VP9 = { codec: "vp09.00.51.08", hardwareAcceleration: "prefer-software", optimizeForLatency: true };
 const bytesOf = (name) => Uint8Array.from(atob($(name).textContent), (letter) => letter.charCodeAt(0));
 
@@ -89,11 +89,11 @@ function levelsReader(frames, width, height) {
 }
 
 // Views of streams as RGBA, alpha: disparity, all in one array. Colours are as in JPEG.
-async function* viewsOfStreams({ chunks, order, width, height }, framesOf) {
+async function* viewsOfStreams({ chunks, width, height }, framesOf) {
     const readers = Object.entries(chunks).map(([name, places], i) => (
         levelsReader(framesOf(name, places), width, i === 1 ? 2 * height : height)));
     const rgba = new Uint8ClampedArray(4 * width * height);
-    for (let count = order.length; count--;) {
+    for (let count = chunks.luma.length; count--;) {
         const [luma, chroma, disparity] = await Promise.all(readers.map((next) => next()));
         for (let i = 0, at = 0; i < luma.length; i++) {
             const y = luma[i], blue = chroma[i] - 128, red = chroma[luma.length + i] - 128;
@@ -130,7 +130,14 @@ async function* viewsOfPictures({ hasDisparity, width, height, colorSpace }) {
     }
 }
 
-// Stores all views; `onView` hears of each. The middle one is shown alone until all are there.
+// Returns some disparities of the middle view, the least and the greatest among them.
+function sampleOf({ middle, range: [far, near] }) {
+    const step = Math.max(Math.floor(middle.length / SAMPLE_SIZE), 1), levels = middle.filter((_, i) => i % step === 0);
+    const ends = [Math.min, Math.max].map((end) => middle.reduce((one, other) => end(one, other)));
+    return [...levels, ...ends].map((level) => far + (near - far) * level / 255);
+}
+
+// Stores all views and the hidden surface; `onView` hears of each. The middle view is shown alone until all are there.
 export async function load(field, renderer, onView) {
     const { order, chunks, layers, hasDisparity } = field;
     const streams = chunks.luma ? [decoded, stepped].map((frames) => viewsOfStreams(field, frames)) : [];
@@ -139,9 +146,12 @@ export async function load(field, renderer, onView) {
         count = 0;
         try {
             for await (const rgba of views) {
-                if (!count && hasDisparity) field.middle = rgba.filter((_, i) => i % 4 === 3);
+                if (!count && hasDisparity) {
+                    field.middle = rgba.filter((_, i) => i % 4 === 3);
+                    field.sample = sampleOf(field);
+                }
                 renderer.upload(count, rgba);
-                onView(++count);
+                onView(Math.min(++count, order.length));
             }
             break;
         } catch (error) {

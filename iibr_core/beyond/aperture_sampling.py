@@ -1,16 +1,13 @@
-"""Positions of a picture's pinhole cameras in the aperture.
+"""Positions of pinhole cameras in the aperture, and the places in a pixel at which they look.
 
-Each pass has a spiral of cameras (Vogel's sunflower), turned and shifted from pass to pass, so its points are evenly
-spread, alone and with those of other passes, and form no lines. The first spiral, which may be the only one, is moved
-and scaled until it has the centre and the width (second moment) of the opening: a picture of few cameras is coarser,
-never sharper or more blurred. The others are not, because few cameras a pass would leave the middle and the border
-empty.
+Cameras for which views are made lie on a spiral (Vogel's sunflower): evenly spread, in no lines, with the centre and
+the width (second moment) of the opening, so few cameras are coarser, never sharper or more blurred. A grid of samples
+weighs stored views.
 """
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +21,13 @@ Points = NDArray[np.float64]
 GRID_SIDE = 64
 """Number of samples across the opening from which its area, centre and width are computed."""
 
-EDGE = 1 / GRID_SIDE
-"""Width of the opening's antialiased edge, as a share of the circle around it."""
+APERTURE_SIDE = 32
+"""Number of samples across the opening that weigh stored views."""
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
-TURN_STEP, SHIFT_STEP = 0.7548776662466927, 0.5698402909980532
-"""Steps from pass to pass (R2): turn, as a share of a full turn, and shift along the spiral, in points."""
 
 SQRT_STEPS = (0.41421356237309515, 0.7320508075688772, 0.23606797749978969, 0.6457513110645906, 0.3166247903553998)
 """Steps of independent sequences: fractions of the roots of 2, 3, 5, 7 and 11."""
-
-COARSENESS_VARIANCE = 1 / 12
-"""Second moment of a square with a side of 1, per axis: each camera is blurred by its share of the aperture."""
 
 
 def fractions(first: int, count: int, steps: tuple[float, ...]) -> NDArray[np.float64]:
@@ -43,39 +35,44 @@ def fractions(first: int, count: int, steps: tuple[float, ...]) -> NDArray[np.fl
     return np.asarray((np.arange(first, first + count)[:, None] * np.array(steps) + 0.5) % 1.0)
 
 
-def aperture_points(
-    shape: ApertureShape, diameter: float, widest: float, count: int, pass_index: int, cell: float = 0.0
-) -> Points:
-    """Return about `count` points (N, 2) of the aperture for one pass, as (t, s) from its middle, in view steps.
+def aperture_points(shape: ApertureShape, diameter: float, widest: float, count: int) -> Points:
+    """Return about `count` points (N, 2) of the aperture, as (t, s) from its middle, in view steps.
 
-    diameter: view steps. widest: side of the square that cuts the opening off, view steps. cell: side of the square of
-    the aperture that a camera stands for, view steps; its picture is blurred by as much. An opening without points
+    diameter: view steps. widest: side of the square that cuts the opening off, view steps. An opening without points
     counts as a pinhole in its middle.
     """
     cut = min(widest / diameter, 1.0)
-    area, centre, moment = _measure(shape, cut)
-    points = _open_spiral(shape, cut, max(round(count / area), count) if area > 0 else 0, pass_index)
-    if len(points) == 0:
+    samples, weights = _samples(shape, cut, GRID_SIDE)
+    if weights.sum() == 0:
         return np.zeros((1, 2))
-    points = points - (points.mean(axis=0) if pass_index == 0 else centre)
-    spread = float(np.mean(points**2)) if pass_index == 0 else moment
-    if spread > 0:
-        points *= math.sqrt(max(moment - COARSENESS_VARIANCE * (cell / diameter) ** 2, 0.0) / spread)
+    centre = weights @ samples / weights.sum()
+    moment = float(weights @ ((samples - centre) ** 2).sum(axis=-1)) / weights.sum() / 2
+    area = min(float(weights.mean()) * 4 / math.pi, 1.0)
+    points = _open_spiral(shape, cut, max(round(count / area), count))
+    points = points - points.mean(axis=0)
+    if (spread := float(np.mean(points**2))) > 0:
+        points *= math.sqrt(moment / spread)
     # Scaled points stay in the circle around the opening: there may be no views outside it.
     beyond = np.hypot(*(points + centre).T) / (_reach(shape, cut) / 2)
     return np.asarray(diameter * (points + centre) / np.maximum(beyond, 1.0)[:, None])
 
 
-def open_area(shape: ApertureShape, diameter: float, widest: float) -> float:
-    """Return the area of the opening in square view steps. Arguments: see `aperture_points`."""
-    cut = min(widest / diameter, 1.0)
-    return _measure(shape, cut)[0] * math.pi / 4 * (diameter * _reach(shape, cut)) ** 2
+def views_in_aperture(shape: ApertureShape, diameter: float, eye: ViewOffset, grid: GridShape) -> NDArray[np.float64]:
+    """Return weights (V, U) of a grid's views that an aperture around the eye adds up; their sum is 1.
+
+    The opening is cut off to a square as wide as the longer side of the grid.
+    """
+    points, weights = _samples(shape, min(max(grid) / diameter, 1.0), APERTURE_SIDE)
+    if (total := weights.sum()) == 0:
+        return grid_weights(np.zeros((1, 2)), eye, grid)
+    return grid_weights(diameter * points, eye, grid, weights / total)
 
 
-def grid_weights(points: Points, eye: ViewOffset, grid: GridShape) -> NDArray[np.float64]:
-    """Return weights (V, U) of a grid's views that replace cameras at points (N, 2) of the lens; their sum is N.
+def grid_weights(points: Points, eye: ViewOffset, grid: GridShape, shares: Points | None = None) -> Points:
+    """Return weights (V, U) of a grid's views that replace cameras at points (N, 2) of the lens.
 
-    Each camera is shared bilinearly by the views around it; outside the grid, the views at its border count.
+    Each camera counts 1, or its share (N,). The views around it share that bilinearly; outside the grid, those at its
+    border count.
     """
     last = np.array(grid) - 1
     inside = np.clip(np.array(eye) + np.array(grid.centre) + points, 0, last)
@@ -84,21 +81,21 @@ def grid_weights(points: Points, eye: ViewOffset, grid: GridShape) -> NDArray[np
     weights = np.zeros(tuple(grid))
     for down, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
         part = np.where(down, share[:, 0], 1 - share[:, 0]) * np.where(across, share[:, 1], 1 - share[:, 1])
+        part = part if shares is None else part * shares
         np.add.at(weights, tuple(np.minimum(cell + np.array((down, across)), last).T), part)
     return weights
 
 
-def _open_spiral(shape: ApertureShape, cut: float, count: int, pass_index: int) -> Points:
+def _open_spiral(shape: ApertureShape, cut: float, count: int) -> Points:
     """Return those points of a spiral of `count` that lie in the opening, for a diameter of 1.
 
     Grey parts of a mask hold a share of their points.
     """
     numbers, reach = np.arange(count), _reach(shape, cut)
-    radius = reach / 2 * np.sqrt((numbers + (0.5 + pass_index * SHIFT_STEP) % 1.0) / max(count, 1))
-    angle = GOLDEN_ANGLE * numbers + 2 * math.pi * TURN_STEP * pass_index
+    radius, angle = reach / 2 * np.sqrt((numbers + 0.5) / max(count, 1)), GOLDEN_ANGLE * numbers
     t, s = radius * np.sin(angle), radius * np.cos(angle)
-    thresholds = fractions(pass_index * count, count, SQRT_STEPS[2:3])[:, 0]
-    return np.stack([t, s], axis=-1)[openness(shape, t, s, 1.0, cut, EDGE * reach) > thresholds]
+    thresholds = fractions(0, count, SQRT_STEPS[2:3])[:, 0]
+    return np.stack([t, s], axis=-1)[openness(shape, t, s, 1.0, cut, reach / GRID_SIDE) > thresholds]
 
 
 def _reach(shape: ApertureShape, cut: float) -> float:
@@ -106,20 +103,9 @@ def _reach(shape: ApertureShape, cut: float) -> float:
     return math.sqrt(2) * min(cut, 1.0) if shape.kind == "mask" else min(math.sqrt(2) * cut, 1.0)
 
 
-@lru_cache(maxsize=32)
-def _measure(shape: ApertureShape, cut: float) -> tuple[float, Points, float]:
-    """Return the opening's area, as a share of the circle around it, its centre (t, s) and its second moment.
-
-    The moment is about the centre and per axis, for a diameter of 1.
-    """
+def _samples(shape: ApertureShape, cut: float, side: int) -> tuple[Points, Points]:
+    """Return a grid of points (N, 2) of an opening of diameter 1, and how open it is there (N,)."""
     reach = _reach(shape, cut)
-    places = reach * ((np.arange(GRID_SIDE) + 0.5) / GRID_SIDE - 0.5)
+    places = reach * ((np.arange(side) + 0.5) / side - 0.5)
     t, s = (axis.ravel() for axis in np.meshgrid(places, places, indexing="ij"))
-    weights = openness(shape, t, s, 1.0, cut, EDGE * reach)
-    total = float(weights.sum())
-    if total == 0:
-        return 0.0, np.zeros(2), 0.0
-    points = np.stack([t, s], axis=-1)
-    centre = weights @ points / total
-    moment = float(weights @ ((points - centre) ** 2).sum(axis=-1)) / total / 2
-    return min(float(weights.mean()) * 4 / math.pi, 1.0), centre, moment
+    return np.stack([t, s], axis=-1), openness(shape, t, s, 1.0, cut, reach / side)

@@ -4,12 +4,13 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from iibr_core.beyond.picture_quality import page_numbers
+from iibr_core.beyond import aperture_sampling, lens_slices, optics, picture_quality
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.web_streams import can_encode
@@ -20,12 +21,16 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.extras import how_to_install
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
-from iibr_core.scenes.lens_limits import eye_limits, first_aperture, focus_limits
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.f_numbers import equivalent_f_number, f_number
+from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits, focus_span
+from iibr_core.scenes.outer_views import OuterViews
 from iibr_core.types import SRGB, ImageSize
 
 AVIF = "image/avif"
-SHADERS = "fullscreen.vert", "lens.frag", "present.frag", "window.vert", "window.frag"
+SHADERS = (
+    "fullscreen.vert", "blocks.vert", "lens.frag", "surfaces.frag", "occupancy.frag", "slice.frag", "disc.frag",
+    "composite.frag", "present.frag", "window.vert", "window.frag",
+)  # fmt: skip
 """The shaders that the page has: the desktop's, and those of a headset, see `web/renderer.js`."""
 PREAMBLE = "preamble.glsl"
 """The first lines of each shader in a page."""
@@ -34,11 +39,12 @@ POLICY = (
     " form-action 'none'"
 )
 FILE = '<script type="text/plain" id="{name}">{data}</script>'
-SCRIPTS = "renderer.js", "views.js", "headset.js", "tilt.js", "viewer.js"
+SCRIPTS = "slices.js", "lens.js", "discs.js", "renderer.js", "views.js", "headset.js", "tilt.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function|async)", re.MULTILINE)
 """Imports and exports of the scripts, which are one module in a page."""
-COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
-"""Comments and empty lines of a shader."""
+COMMENT = re.compile(r"(?<!:)//[^\n]*$", re.MULTILINE)
+BLANK = re.compile(r"^\s+|[ \t]+$", re.MULTILINE)
+"""Indentation, ends of lines and empty lines."""
 
 
 NO_STREAMS = " Safari will show the middle view only: streams of all views need PyAV; {}, and export again."
@@ -62,7 +68,13 @@ def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebV
     scene = source.scene
     size, keeps_views = ImageSize(scene.height, scene.width), options.target == "headset"
     form = form_that_fits(scene.grid, size, can_encode(), keeps_views)
-    store = ViewStore(source.views(with_disparity=True, in_srgb=False), scene.grid, form, scene.color_space)
+    store, outer, centre = ViewStore(scene.grid, form, scene.color_space), OuterViews(scene), None
+    for view in source.views(with_disparity=True, in_srgb=False):
+        store.add(view)
+        outer.take(view)
+        centre = centre or view
+    if centre is not None and centre.disparity is not None and (hidden := outer.hidden_behind(centre)) is not None:
+        store.add_hidden(hidden, centre.disparity)
     words = _words(source, options.credit)
     if options.budget is None:
         views = store.encode(form)
@@ -106,25 +118,26 @@ def _page(source: ExportSource, words: dict[str, str], views: WebViews) -> bytes
 
 def page_script() -> str:
     """Return the page's scripts as one module, since a page cannot import files."""
-    return LINK.sub("", "\n".join((resource_folder("web") / name).read_text("utf-8") for name in SCRIPTS))
+    return _smaller(LINK.sub("", "\n".join((resource_folder("web") / name).read_text("utf-8") for name in SCRIPTS)))
+
+
+def _smaller(code: str) -> str:
+    """Return the code of a script or a shader without comments, indentation and empty lines."""
+    return BLANK.sub("", COMMENT.sub("", code))
 
 
 def _shaders(folder: Path) -> dict[str, str]:
-    """Return the shaders by name, without comments and without the version line, which the preamble replaces."""
+    """Return the shaders by name, without the version line, which the preamble replaces."""
     sources = {name: flatten(resource_folder("shaders") / name).text for name in SHADERS}
-    without = {name: COMMENT.sub("", text.partition("\n")[2]) for name, text in sources.items()}
+    without = {name: _smaller(text.partition("\n")[2]) for name, text in sources.items()}
     return {PREAMBLE: (folder / PREAMBLE).read_text("utf-8"), **without}
-
-
-def page_aperture_limit(scene: Scene) -> float:
-    """Return the widest aperture of a page in view steps: the grid, because its views are added up."""
-    return float(max(scene.grid) if max(scene.grid) > 1 else 0)
 
 
 def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
     """Return the script's data about the field; lengths are in pixels of the page's views."""
     scene = source.scene
-    scale, widest = views.size.width / scene.width, page_aperture_limit(scene)
+    scale = views.size.width / scene.width
+    lens = source.optics.with_focus_scaled(scale)
     return {
         "rows": scene.grid.rows,
         "columns": scene.grid.columns,
@@ -139,12 +152,37 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "colorSpace": "srgb" if scene.color_space == SRGB else "display-p3",
         "eyeLimits": {"t": eye_limits(scene.grid.rows), "s": eye_limits(scene.grid.columns)},
         "focusLimits": [scale * limit for limit in focus_limits(scene)],
-        "apertureLimits": [0.0, widest],
-        "firstAperture": min(first_aperture(scene), widest),
-        "focus": scale * source.optics.focus_disparity,
-        "aperture": min(source.optics.aperture_diameter, widest),
+        "apertureLimits": [0.0, aperture_limit(scene)],
+        "rangeLimits": [0.0, scale * focus_span(scene)],
+        "firstAperture": first_aperture(scene),
+        "unitFNumber": (f_number(scene, 1.0) or equivalent_f_number(scene, 1.0)) if views.has_disparity else None,
+        "isExactFNumber": f_number(scene, 1.0) is not None,
+        "optics": {
+            "focus": lens.focus_disparity,
+            "aperture": lens.aperture_diameter,
+            "range": lens.focus_range,
+            "tilt": lens.focus_tilt,
+            "shape": _page_shape(lens.aperture_shape),
+            "highlights": lens.highlight_recovery,
+        },
         "numbers": page_numbers(),
     }
+
+
+def page_numbers() -> dict[str, Any]:
+    """Return the numbers that the scripts in `web/` need, by name."""
+    modules = picture_quality, aperture_sampling, lens_slices, optics
+    numbers = {name: value for module in modules for name, value in vars(module).items() if _is_number(name, value)}
+    return {**numbers, "LEVELS": [asdict(level) for level in picture_quality.QUALITY_LEVELS]}
+
+
+def _is_number(name: str, value: Any) -> bool:
+    return name.isupper() and (isinstance(value, int | float) or name == "SQRT_STEPS")
+
+
+def _page_shape(shape: optics.ApertureShape) -> dict[str, Any]:
+    """Return a shape without the picture of a mask, which pages do not have: their lens is then a disc."""
+    return asdict(optics.ApertureShape() if shape.kind == "mask" else shape)
 
 
 def _json(value: Any) -> str:

@@ -6,7 +6,7 @@ every browser shows its frames.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from itertools import product
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from iibr_core.beyond.hidden_surfaces import HiddenSurface
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.exports.web_streams import SMALL_SPEED, Stream, chroma_of, encode_levels, luma_of
@@ -81,7 +82,7 @@ class WebForm:
 
 @dataclass(frozen=True, eq=False)
 class WebViews:
-    """Encoded views in the order of `places`, from the middle outwards.
+    """Encoded views in the order of `places`, from the middle outwards, and the surface hidden behind the middle one.
 
     range_px: disparities of the bytes 0 and 255, px per view step of this size. has_disparity: whether all views have
     disparity. first: still picture of the middle view. streams: files by their names in `web/views.js`. pictures: the
@@ -128,26 +129,40 @@ def places_of(grid: GridShape, form: WebForm) -> tuple[ViewOffset, ...]:
 class ViewStore:
     """The views of a form, in 8 bits, to be encoded more than once."""
 
-    def __init__(self, views: Iterable[ViewUpdate], grid: GridShape, form: WebForm, space: ColorSpace) -> None:
-        """Store the views that the form takes; the first one, the centre, determines the disparity range.
+    def __init__(self, grid: GridShape, form: WebForm, space: ColorSpace) -> None:
+        """Begin without views. form: tells which are stored. space: their colour space.
 
-        space: colour space of the views. The page has sRGB for sRGB views and Display P3 for others.
+        The page has sRGB for sRGB views and Display P3 for others.
         """
-        self._grid, self._form, self._space = grid, form, SRGB if space == SRGB else DISPLAY_P3
+        self._grid, self._form = grid, form
+        self._of_views, self._space = space, SRGB if space == SRGB else DISPLAY_P3
         self._colors: dict[ViewOffset, Bytes] = {}
         self._disparities: dict[ViewOffset, Bytes] = {}
+        self._hidden: list[tuple[Bytes, Bytes]] = []
         self._range_px = (0.0, 0.0)
-        for view in views:
-            offset = grid.offset(view.row, view.column)
-            if form.takes(offset):
-                self._colors[offset] = self._converted(view, space)
-                if view.disparity is not None:
-                    self._disparities[offset] = self._levels(view.disparity)
 
-    def _converted(self, view: ViewUpdate, space: ColorSpace) -> Bytes:
-        if view.colors.dtype == np.uint8 and space == self._space:
+    def add(self, view: ViewUpdate) -> None:
+        """Store a view if the form takes it; the first one, the centre, determines the disparity range."""
+        offset = self._grid.offset(view.row, view.column)
+        if self._form.takes(offset):
+            self._colors[offset] = self._converted(view)
+            if view.disparity is not None:
+                self._disparities[offset] = self._levels(view.disparity)
+
+    def add_hidden(self, surface: HiddenSurface, centre: FloatImage) -> None:
+        """Store the surface behind the centre view's, which has this disparity (H, W).
+
+        Where nothing is known, it has the centre's disparity: no lens shows it there behind itself.
+        """
+        if np.array_equal(surface.disparity, centre):
+            return
+        colors = bytes_from_encoded(convert(surface.colors, self._space, self._of_views))
+        self._hidden = [(colors, self._levels(np.where(surface.mask, surface.disparity, centre)))]
+
+    def _converted(self, view: ViewUpdate) -> Bytes:
+        if view.colors.dtype == np.uint8 and self._of_views == self._space:
             return view.colors.view(np.uint8).copy()
-        return bytes_from_encoded(convert(encoded_from_stored(view.colors), self._space, space))
+        return bytes_from_encoded(convert(encoded_from_stored(view.colors), self._space, self._of_views))
 
     def _levels(self, disparity: FloatImage) -> Bytes:
         if not self._disparities:
@@ -167,6 +182,9 @@ class ViewStore:
         depths = [nearest_pixels(self._disparities[place], size) for place in places if place in self._disparities]
         far, near = (size.width / stored.width * value for value in self._range_px)
         has_disparity, is_video = len(depths) == len(colors), form.is_video
+        for hidden_colors, levels in self._hidden if has_disparity else []:
+            colors.append(_smaller_colors(hidden_colors, size))
+            depths.append(nearest_pixels(levels, size))
         pictures = {} if is_video else {"colors": _moving(colors, form.quality, self._space, "4:4:4")}
         if has_disparity:
             pictures["depths"] = _moving(depths[: 1 if is_video else None], DEPTH_QUALITY, SRGB, "4:0:0")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights
+from iibr_core.beyond.aperture_sampling import aperture_points, views_in_aperture
 from iibr_core.beyond.lens import LensSum
 from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
 from iibr_core.color import encoded_from_stored, srgb_from_linear
@@ -92,15 +92,14 @@ class LightField:
         """Yield offset, weight and colours of the views that a lens adds up."""
         widest = float(max(self.grid))
         if self._view_between is None:
-            points = aperture_points(ApertureShape(), aperture, widest, MAX_CAMERAS, 0)
-            weights = grid_weights(points, CENTRE, self.grid)
+            weights = views_in_aperture(ApertureShape(), aperture, CENTRE, self.grid)
             for row, column in np.argwhere(weights > 0):
                 colors = encoded_from_stored(self.views[row, column])
                 t, s = self.grid.offset(row, column)
                 yield ViewOffset(self.row_step * t, s), float(weights[row, column]), colors
             return
         count = self._camera_count(focus, min(aperture, widest))
-        for t, s in aperture_points(ApertureShape(), aperture, widest, count, 0).tolist():
+        for t, s in aperture_points(ApertureShape(), aperture, widest, count).tolist():
             yield ViewOffset(t, s), 1.0, self._view_between(ViewOffset(t, s))
 
     def _camera_count(self, focus: float, aperture: float) -> int:

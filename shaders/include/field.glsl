@@ -56,35 +56,3 @@ vec4 light_at(vec2 at, float layer) {
     root += weights.w * textureLod(colors, vec3(centre.x, ends.w, layer), 0.0);
     return light_from_root(max(root / (middle + dot(weights, vec4(1.0))), 0.0));
 }
-
-#ifdef SUMMED
-void add_tap(vec2 texel, float layer, float weight, inout vec4 roots, inout vec4 light) {
-    vec4 root = textureLod(colors, vec3((texel + 0.5) / view_size_px, layer), 0.0);
-    roots += weight * root;
-    light += weight * light_from_root(root);
-}
-
-// Linear light and depth (0..1) of a stored view, between pixels, by five bilinear fetches. What is in focus is
-// interpolated by Keys' kernel (1981; a = -0.75, which keeps the view's sharpness best), without the corners of its 16
-// taps, whose weights are next to nothing. What moves by cell_px from one camera to the next is averaged over as much.
-vec4 mean_light_at(vec2 at, float layer, float cell_px) {
-    at = clamp(mirrored(at), 0.0, 1.0);
-    vec2 texel = at * view_size_px - 0.5, f = fract(texel), first = floor(texel);
-    vec2 before = -0.75 * f * (1.0 - f) * (1.0 - f), after = -0.75 * f * f * (1.0 - f), inner = 1.0 - before - after;
-    vec2 centre = first + f * (0.75 + f * (1.5 - 1.25 * f)) / inner;
-    vec4 ends = vec4(first - 1.0, first + 2.0), weights = vec4(before, after) * inner.yxyx;
-    // Five taps in a cross have the second moment of a square: 2/5 reach^2 = 1/12 cell^2.
-    float soft = clamp(cell_px - 0.5, 0.0, 1.0), reach = 0.456 * cell_px, middle = mix(inner.x * inner.y, 0.2, soft);
-    centre = mix(centre, texel, soft);
-    ends = mix(ends, vec4(texel - reach, texel + reach), soft);
-    weights = mix(weights, vec4(0.2), soft);
-    vec4 roots = vec4(0.0), light = vec4(0.0);
-    add_tap(centre, layer, middle, roots, light);
-    add_tap(vec2(ends.x, centre.y), layer, weights.x, roots, light);
-    add_tap(vec2(centre.x, ends.y), layer, weights.y, roots, light);
-    add_tap(vec2(ends.z, centre.y), layer, weights.z, roots, light);
-    add_tap(vec2(centre.x, ends.w), layer, weights.w, roots, light);
-    float total = middle + dot(weights, vec4(1.0));
-    return mix(light_from_root(max(roots / total, 0.0)), light / total, soft);
-}
-#endif

@@ -19,11 +19,7 @@ struct Surface {
 };
 
 // The place in the stored view of a surface of some disparity that lies on the ray.
-// RANGE: all within the focus range counts as in focus.
 vec2 place_at(Ray ray, float disparity) {
-#ifdef RANGE
-    ray.focus = clamp(disparity, ray.focus - focus_range, ray.focus + focus_range);
-#endif
     return ray.uv - ray.camera * ray.focus - ray.to_view * disparity;
 }
 

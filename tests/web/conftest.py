@@ -1,6 +1,7 @@
 """A small scene as a page, a browser that shows it, and the desktop's pictures of the same."""
 
 import base64
+import math
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -85,13 +86,19 @@ def slide(tab: Page, name: str, value: float) -> None:
     )
 
 
+def slide_aperture(tab: Page, aperture: float) -> None:
+    """By the slider, which is in stops: 6 are the widest, 0 a pinhole. aperture: view steps."""
+    widest = tab.evaluate("JSON.parse(document.getElementById('field').textContent).apertureLimits[1]")
+    slide(tab, "aperture", 6 + math.log2(aperture / widest) if aperture else 0.0)
+
+
 def set_lens(tab: Page, s: float, t: float, focus: float, aperture: float) -> None:
     """By keys, a quarter of a view step each, and the sliders."""
     tab.press("Home")
     tab.press("ArrowRight" if s > 0 else "ArrowLeft", round(4 * abs(s)))
     tab.press("ArrowDown" if t > 0 else "ArrowUp", round(4 * abs(t)))
     slide(tab, "focus", focus)
-    slide(tab, "aperture", aperture)
+    slide_aperture(tab, aperture)
 
 
 def canvas(tab: Page) -> np.ndarray:

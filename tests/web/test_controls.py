@@ -1,12 +1,13 @@
 """A hand on the page: pointers, wheels, keys, the bar, and a device that is tilted."""
 
 import json
+import re
 
 import pytest
 
 from tests.browsers.chromium import Tab
 from tests.viewer.conftest import HEIGHT, WIDTH
-from tests.web.conftest import slide, wait_until_still
+from tests.web.conftest import slide, slide_aperture, wait_until_still
 
 FOCUS = "document.getElementById('focus').valueAsNumber"
 LENS = f"[{FOCUS}, document.getElementById('aperture').valueAsNumber]"
@@ -94,13 +95,15 @@ def test_sliders_speak_words(shown) -> None:
     def words() -> dict[str, str]:
         return shown.evaluate(
             "Object.fromEntries([...document.querySelectorAll('[type=range]')]"
-            ".map(slider => [slider.labels[0].innerText.trim(), slider.getAttribute('aria-valuetext')]))"
+            ".map(slider => [slider.labels[0].firstElementChild.textContent, slider.getAttribute('aria-valuetext')]))"
         )
 
     assert words()["Aperture"] == "closed, everything is sharp"
-    slide(shown, "aperture", 1.5)
+    slide_aperture(shown, 1.5)
     slide(shown, "focus", 0.25)
-    assert words()["Aperture"] == "1.5 view steps wide"
+    assert re.fullmatch(r"≈ f/\d\.\d", words()["Aperture"])
+    assert words()["Aperture"] == shown.evaluate("document.getElementById('stop').value")
+    assert (words()["Focus range"], words()["Highlights"]) == ("none", "0 %")
     assert words()["Focus"].endswith("% of the way from far to near, disparity 0.25 pixels")
 
 
@@ -121,7 +124,7 @@ def test_the_bar_is_a_row_of_targets_that_a_finger_hits(tab, page, width, height
         assert top + down <= height
     if width < 760:
         tab.evaluate("document.getElementById('more').click()")
-        assert len(tab.evaluate(code)) == len(targets) + 6, "tilt, reset, save, full screen, headset"
+        assert len(tab.evaluate(code)) == len(targets) + 7, "lens, tilt, reset, save, full screen, headset"
         slide(tab, "focus", 0.3)
         tab.evaluate("document.querySelector('[data-do=reset]').click()")
         assert len(tab.evaluate(code)) == len(targets) + 1

@@ -1,20 +1,23 @@
 import json
 import shutil
 import subprocess
+from dataclasses import asdict
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from iibr_core.beyond.aperture_sampling import aperture_points
-from iibr_core.beyond.optics import ApertureShape
-from iibr_core.beyond.picture_quality import page_numbers
-from iibr_core.exports.web import page_script
+from iibr_core.beyond.lens_slices import slices_of
+from iibr_core.beyond.optics import ApertureShape, Optics
+from iibr_core.exports.web import page_numbers, page_script
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import SRGB, GridShape, ViewOffset
-from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples
+from viewer.gpu.refocus.picture_lens import lens_of
+from viewer.gpu.refocus.view_sampling import Samples, blended_samples
 
 WEB = resource_folder("web")
+MODULES = "slices", "lens", "headset"
 GRID = GridShape(5, 7)
 PRESENT = np.ones(GRID, bool)
 DESKTOP_FIELD = {
@@ -28,7 +31,6 @@ DESKTOP_FIELD = {
     "row_step": 1.0,
 }
 """The field of `node` as the desktop has it."""
-DIAMETERS = (0.3, 3.0, 9.5)
 EYES = (
     ViewOffset(0.0, 0.0),
     ViewOffset(0.5, -0.25),
@@ -46,10 +48,9 @@ def node(code: str, given: Any = None) -> Any:
         "{ rows: 5, columns: 7, width: 96, height: 64, range: [-2, 2], hasDisparity: true, step: 1, rowStep: 1,"
         " layers: new Map() }"
     )
+    imports = (f"import * as {name} from {json.dumps((WEB / f'{name}.js').as_uri())};\n" for name in MODULES)
     text = (
-        f"import * as renderer from {json.dumps((WEB / 'renderer.js').as_uri())};\n"
-        f"import * as headset from {json.dumps((WEB / 'headset.js').as_uri())};\n"
-        f"Object.assign(renderer.NUMBERS, {json.dumps(page_numbers())});\n"
+        "".join(imports) + f"Object.assign(slices.NUMBERS, {json.dumps(page_numbers())});\n"
         f"const given = {json.dumps(given)}, field = {field};\nconsole.log(JSON.stringify({code}));"
     )
     done = subprocess.run([program, "--input-type=module", "-e", text], capture_output=True, text=True, check=True)
@@ -92,31 +93,76 @@ def test_the_pages_script_is_one_module_that_ends_no_element(tmp_path) -> None:
 
 def test_halves_are_rounded_as_in_python() -> None:
     halves = [k / 2 for k in range(20)]
-    assert node("given.map(renderer.rounded)", halves) == list(map(round, halves))
+    assert node("given.map(slices.rounded)", halves) == list(map(round, halves))
 
 
-@pytest.mark.parametrize(
-    ("name", "samples_of"), [("answeredSamples", answered_samples), ("blendedSamples", blended_samples)]
-)
+@pytest.mark.parametrize("kind", ["disc", "polygon", "ring"])
 @pytest.mark.parametrize("step", [1, 2, 1000])
-def test_views_that_answer_are_the_desktops(name, samples_of, step) -> None:
+def test_views_that_an_aperture_adds_up_are_the_desktops(kind, step) -> None:
     """The desktop is told that the views that are there are a whole grid: its view step is `step` of the page's."""
-    grid = GridShape(*(2 * (middle // step) + 1 for middle in GRID.centre))
-    points = aperture_points(ApertureShape(), 5.0, 7.0, 100, 3)
-    first = () if name == "blendedSamples" else (300,)
-    told_points = [told(ViewOffset(*point)) for point in points.tolist()]
-    found = node(
-        f"given.eyes.map(eye => renderer.{name}(given.points, ...given.first, eye, {{ ...field, step: {step} }}))",
-        {"points": told_points, "first": first, "eyes": list(map(told, EYES))},
+    grid, shape = GridShape(*(2 * (middle // step) + 1 for middle in GRID.centre)), ApertureShape(kind, blades=5)
+    code = (
+        "given.eyes.map(eye => lens.viewsInAperture({ shape: given.shape, diameter: given.diameter, eye },"
+        f" {{ ...field, step: {step} }}))"
     )
+    diameter = 3.0
+    found = node(code, {"shape": asdict(shape), "diameter": diameter, "eyes": list(map(told, EYES))})
     for eye, samples in zip(EYES, found):
         eye_there = ViewOffset(eye.t / step, eye.s / step)
-        wanted = samples_of(points / step, *first, eye_there, grid, np.ones(grid, bool))
+        wanted = blended_samples(shape, diameter / step, eye_there, grid, np.ones(grid, bool))
         assert found_weights(samples) == pytest.approx(wanted_weights(wanted, grid, step)), eye
 
 
+SHAPES = (
+    ApertureShape(),
+    ApertureShape("polygon", blades=5, rotation_deg=20.0),
+    ApertureShape("ring", ring_inner=0.6),
+    ApertureShape("cat_eye"),
+)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=[shape.kind for shape in SHAPES])
+def test_slices_and_discs_are_the_cores(shape) -> None:
+    """Few surfaces, a slope from near to far with more slices than there may be, and one surface."""
+    random = np.random.default_rng(3)
+    cases = [random.uniform(-60, 90, 4).round(2), random.uniform(-2000, 3000, 600), np.array([7.5]), np.array([])]
+    code = "given.cases.map(values => slices.slicesOf(values, given.shape))"
+    found = node(code, {"cases": [values.tolist() for values in cases], "shape": asdict(shape)})
+    for values, of_page in zip(cases, found, strict=True):
+        wanted = slices_of(values, shape)
+        assert [one["diameterPx"] for one in of_page] == pytest.approx([one.diameter_px for one in wanted])
+        assert [one["level"] for one in of_page] == [one.level for one in wanted]
+        assert [one["reachPx"] for one in of_page] == pytest.approx([one.reach_px for one in wanted])
+        for one, other in zip(of_page, wanted):
+            np.testing.assert_allclose(one["taps"], other.taps, atol=1e-9)
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.5, -1.0)])
+@pytest.mark.parametrize("aperture", [0.0, 0.7, 6.0, 900.0])
+def test_the_lens_is_the_desktops(tilt, aperture) -> None:
+    sample = np.random.default_rng(2).uniform(-2, 1.5, 50)
+    optics = Optics(
+        focus_disparity=0.25, focus_range=0.3, focus_tilt=tilt, aperture_diameter=aperture, highlight_recovery=0.5
+    )
+    told_optics = {
+        "eye": {"t": 0, "s": 0}, "focus": 0.25, "range": 0.3, "tilt": tilt, "aperture": aperture, "highlights": 0.5,
+        "shape": asdict(ApertureShape()),
+    }  # fmt: skip
+    found = node(
+        "lens.lensOf(given.optics, { ...field, sample: given.sample }, 200)",
+        {"optics": told_optics, "sample": sample.tolist()},
+    )
+    field = SimpleNamespace(**DESKTOP_FIELD, disparity_sample=sample, has_disparity=PRESENT)
+    wanted = lens_of(optics, field, 200)
+    assert [one["diameterPx"] for one in found["slices"]] == pytest.approx([one.diameter_px for one in wanted.slices])
+    assert found["discPx"] == pytest.approx(wanted.disc_px)
+    assert found["texelPx"] == pytest.approx(wanted.texel_px)
+    assert found["marginPx"] == wanted.margin_px
+    assert found["gain"] == pytest.approx(wanted.highlight_gain)
+
+
 def test_a_tap_finds_the_first_surface_on_its_ray() -> None:
-    code = "renderer.pick({...field, width: 8, height: 1}, [0, 0, 0, 0, 255, 255, 0, 0], given, 0.3, 0.5)"
+    code = "lens.pick({...field, width: 8, height: 1}, [0, 0, 0, 0, 255, 255, 0, 0], given, 0.3, 0.5)"
     assert node(code, {"t": 0, "s": 0}) == -2
     assert node(code, {"t": 0, "s": 1}) == 2, "the near one, two pixels aside"
 

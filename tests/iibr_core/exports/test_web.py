@@ -18,11 +18,12 @@ from iibr_core.exports.web_views import MAX_TEXELS, WebForm, form_that_fits
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.images.metadata import caption_in
 from iibr_core.formats.images.open_picture import read_metadata
+from iibr_core.scenes.f_numbers import equivalent_f_number
 from iibr_core.scenes.lens_choice import LensChoice
-from iibr_core.scenes.lens_limits import focus_limits
+from iibr_core.scenes.lens_limits import aperture_limit, first_aperture, focus_limits
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
-from tests.viewer.conftest import write_scene
+from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 
 KIND = EXPORTS["web"]
 XMP = """<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
@@ -43,11 +44,11 @@ def page_of(opened, **options) -> tuple[str, dict]:
     return text, json.loads(text.partition('id="field">')[2].partition("</script>")[0])
 
 
-def frames_of(text: str, field: dict, name: str) -> list[np.ndarray]:
-    """Return the levels of a stream of a page, one picture a chunk."""
+def frames_of(text: str, field: dict, name: str, hidden: int = 0) -> list[np.ndarray]:
+    """Return the levels of a stream of a page, one picture a chunk. hidden: number of hidden surfaces."""
     data = base64.b64decode(text.partition(f'id="{name}">')[2].partition("</script>")[0])
     chunks = tuple(map(tuple, field["chunks"][name]))
-    assert len(chunks) == len(field["order"])
+    assert len(chunks) == len(field["order"]) + hidden
     height, width = field["height"] * (1 + (name == "chroma")), field["width"]
     return [frame[:height, :width] for frame in decoded_levels(Stream(data, chunks))]
 
@@ -137,7 +138,9 @@ def test_the_field_is_described_and_the_first_picture_is_the_middle(opened) -> N
     assert {(at["t"], at["s"]) for at in field["order"]} == {(t, s) for t in range(-2, 3) for s in range(-2, 3)}
     low, high = scene.disparity_range_px
     assert field["range"] == pytest.approx([low - 0.05 * (high - low), high + 0.05 * (high - low)], abs=0.01)
-    assert (field["apertureLimits"], field["firstAperture"]) == ([0, 5], pytest.approx(3.0))
+    assert field["apertureLimits"] == [0, pytest.approx(aperture_limit(scene))]
+    assert field["firstAperture"] == pytest.approx(first_aperture(scene))
+    assert field["unitFNumber"] / 2 == pytest.approx(equivalent_f_number(scene, 2.0))
     assert field["focusLimits"] == pytest.approx(focus_limits(scene))
     letters = re.search(r'src="data:image/avif;base64,([^"]*)"', text)
     with Image.open(BytesIO(base64.b64decode(letters[1]))) as image:
@@ -145,16 +148,20 @@ def test_the_field_is_described_and_the_first_picture_is_the_middle(opened) -> N
     assert np.abs(first - next(opened.views()).colors).mean() < 4
 
 
-def test_streams_hold_each_view_as_one_frame(opened) -> None:
+def test_streams_hold_each_view_as_one_frame_and_what_lies_behind(opened) -> None:
     text, field = page_of(opened)
     assert page_of(opened)[0] == text, "the same views give the same page"
-    luma, chroma, levels = (frames_of(text, field, name) for name in ("luma", "chroma", "disparity"))
+    luma, chroma, levels = (frames_of(text, field, name, hidden=1) for name in ("luma", "chroma", "disparity"))
     near, far = field["range"][1], field["range"][0]
     for view in opened.views(with_disparity=True):
         at = field["order"].index(dict(zip("ts", opened.scene.grid.offset(view.row, view.column))))
         decoded = rgb_from(luma[at], chroma[at])
         assert psnr(decoded, view.colors) > 36
         np.testing.assert_allclose(far + (near - far) * levels[at] / 255, view.disparity, atol=0.1)
+    square = np.s_[HEIGHT // 4 : HEIGHT // 4 + 4, WIDTH // 3 : 2 * WIDTH // 3]
+    np.testing.assert_allclose(
+        far + (near - far) * levels[-1][square] / 255, opened.scene.disparity_range_px[0], atol=0.1
+    )
 
 
 @pytest.mark.parametrize("size", [(1, 7), (97, 211)])

@@ -9,7 +9,7 @@ PIXELS = 400_000
 
 
 def work_in(level):
-    return fetches_of(round(12 * level.cameras), round(PIXELS * level.scale**2), warps=True)
+    return fetches_of(3 * level.sources, round(PIXELS * level.scale**2), warps=True)
 
 
 def test_more_time_means_less_haste():

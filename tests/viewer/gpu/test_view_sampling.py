@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.beyond.aperture_sampling import views_in_aperture
+from iibr_core.beyond.optics import CENTRE, ApertureShape
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus import view_sampling
-from viewer.gpu.refocus.view_sampling import answered_samples, pinhole_sources
+from viewer.gpu.refocus.view_sampling import pinhole_sources
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)
@@ -31,10 +33,6 @@ def shares_of_views(samples):
     shares = np.zeros(GRID)
     np.add.at(shares, tuple(samples.views.T), samples.weights / samples.weights.sum())
     return shares
-
-
-def spread_points(count, radius):
-    return np.random.default_rng(1).uniform(-radius, radius, (count, 2))
 
 
 @given(eye=places, seed=st.integers(0, 50))
@@ -63,22 +61,13 @@ def test_a_stored_view_alone_shows_its_own_place():
         assert weights[row, column] == pytest.approx(1, abs=1e-4)
 
 
-@pytest.mark.parametrize("eye", [ViewOffset(0.25, -0.5), ViewOffset(-1.9, 1.2), ViewOffset(3.0, 0.1)])
-def test_cameras_together_blend_views_as_a_pinhole_does(eye):
-    """And in passes as at once: each goes on in the sequence."""
-    samples = answered_samples(np.zeros((600, 2)), 0, eye, GRID, FULL)
-    assert shares_of_views(samples) == pytest.approx(weights_by_view(pinhole_sources(eye, GRID, FULL)), abs=0.01)
-    later = answered_samples(np.zeros((20, 2)), 100, eye, GRID, FULL)
-    assert np.array_equal(later.views, samples.views[100:120])
-
-
-def test_blended_views_weigh_what_the_points_ask_of_them():
-    points = spread_points(300, 0.8)
-    eye = ViewOffset(0.25, -0.5)
-    expected = np.mean(
-        [weights_by_view(pinhole_sources(ViewOffset(*(point + eye)), GRID, FULL)) for point in points], axis=0
-    )
-    assert shares_of_views(view_sampling.blended_samples(points, eye, GRID, FULL)) == pytest.approx(expected, abs=1e-3)
+def test_missing_views_are_replaced_by_their_neighbours_in_an_aperture():
+    shape, present = ApertureShape(), some_views(7)
+    everywhere = shares_of_views(view_sampling.blended_samples(shape, 3.0, CENTRE, GRID, FULL))
+    assert everywhere == pytest.approx(views_in_aperture(shape, 3.0, CENTRE, GRID), abs=1e-3)
+    shares = shares_of_views(view_sampling.blended_samples(shape, 3.0, CENTRE, GRID, present))
+    assert shares.sum() == pytest.approx(1)
+    assert (shares[~present] == 0).all()
 
 
 def test_nearest_present_against_a_plain_search():

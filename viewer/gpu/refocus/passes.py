@@ -97,7 +97,6 @@ class Passes:
             {
                 "WARP": has_views_to_warp,
                 "NEAR": has_views_to_warp and _are_near(field, lens, samples),
-                "RANGE": lens.optics.focus_range > 0,
                 "DOLLY": lens.has_dolly,
                 "GLOSS": field.gloss is not None and lens.optics.gloss is not None,
                 "HIGHLIGHTS": lens.highlight_gain > 0,
@@ -176,8 +175,7 @@ class Passes:
         cameras, answers, numbers = table
         cameras[:count, :2] = samples.cameras[:, ::-1]
         # All views that answer a pinhole have the same place in the pixel.
-        numbered = (first // count, 1) if lens.diameter == 0 else (first, count)
-        cameras[:count, 2:] = fractions(*numbered, SQRT_STEPS[3:]) - 0.5 + OFF_BORDER_PX
+        cameras[:count, 2:] = fractions(first // count, 1, SQRT_STEPS[3:]) - 0.5 + OFF_BORDER_PX
         answers[:count, :2] = _to_views(field, lens, samples)[:, ::-1]
         views = tuple(samples.views.T)
         numbers[:count, 0], numbers[:count, 1] = field.layers[views], field.has_disparity[views]
@@ -215,4 +213,4 @@ def _are_near(field: LightFieldTexture, lens: Lens, samples: Samples) -> bool:
     parallax_px = np.hypot(field.row_step * to_views[:, 0], to_views[:, 1]) * (field.range_px[1] - field.range_px[0])
     max_px = NEAR_PX if field.present.sum() > 1 else ALONE_NEAR_PX
     is_in_cell = bool(np.abs(to_views).max() <= 1)
-    return is_in_cell and (parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= max_px
+    return is_in_cell and bool(parallax_px.max() <= max_px)

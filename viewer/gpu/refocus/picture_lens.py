@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_sampling import aperture_points
 from iibr_core.beyond.lens_slices import Slice, slices_of
 from iibr_core.beyond.optics import Optics
-from iibr_core.beyond.picture_quality import BEST_QUALITY, BLEND_POINTS, EDGE_PASSES, QualityLevel
+from iibr_core.beyond.picture_quality import BEST_QUALITY, EDGE_PASSES, QualityLevel
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
@@ -95,8 +94,7 @@ class Lens:
         if self.diameter == 0:
             sources = view_sampling.pinhole_sources(self.eye, grid, present)
             return view_sampling.pinhole_samples(sources[: self.level.sources])
-        points = aperture_points(self.optics.aperture_shape, self.diameter, float(max(grid)), BLEND_POINTS, 0)
-        return view_sampling.blended_samples(points, self.eye, grid, present)
+        return view_sampling.blended_samples(self.optics.aperture_shape, self.diameter, self.eye, grid, present)
 
     def sample_count(self, field: LightFieldTexture) -> int:
         """Return the number of samples of a pass."""

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_sampling import SQRT_STEPS, Points, fractions, grid_weights
+from iibr_core.beyond.aperture_sampling import Points, views_in_aperture
+from iibr_core.beyond.optics import ApertureShape
 from iibr_core.beyond.picture_quality import MAX_SOURCES, MIN_WEIGHT
 from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
@@ -101,31 +102,17 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
     return [WeightedView(int(rows[i]), int(columns[i]), float(w)) for i, w in zip(order, weights) if w > 1e-5]
 
 
-def answered_samples(
-    points: Points, first: int, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
+def blended_samples(
+    shape: ApertureShape, diameter: float, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
 ) -> Samples:
-    """Return cameras at these points (N, 2) of the lens, of equal weight, each answered by a corner of its cell.
+    """Return the stored views that an open lens adds up: views without disparity cannot be warped.
 
-    A sequence chooses the corners in the shares of `pinhole_sources`, so that all cameras together blend views as a
-    pinhole does. first: number of the first point in the sequence. present: (V, U) bool, some True.
-    """
-    places = np.array(eye) + np.array(grid.centre) + points
-    last = np.array(grid) - 1
-    inside = np.clip(places, 0, last)
-    cell = np.floor(inside)
-    chosen = cell + (fractions(first, len(points), SQRT_STEPS[:2]) < inside - cell)
-    rows, columns = np.minimum(chosen, last).astype(np.intp).T
-    return Samples(points, nearest_present(present)[rows, columns], np.ones(len(points)))
-
-
-def blended_samples(points: Points, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> Samples:
-    """Return the stored views in place of cameras at these points, weighted by the points around them.
-
-    This is for views without disparity, which cannot be warped. Arguments: see `answered_samples`.
+    diameter: of the aperture, view steps. present: (V, U) bool, some True.
     """
     weights = np.zeros(tuple(grid))
-    np.add.at(weights, tuple(np.moveaxis(nearest_present(present), -1, 0)), grid_weights(points, eye, grid))
-    views = np.argwhere(weights > MIN_WEIGHT * weights.sum())
+    wanted = views_in_aperture(shape, diameter, eye, grid)
+    np.add.at(weights, tuple(np.moveaxis(nearest_present(present), -1, 0)), wanted)
+    views = np.argwhere(weights > MIN_WEIGHT)
     kept = weights[tuple(views.T)]
     cameras = views - np.array(grid.centre) - np.array(eye)
     return Samples(cameras.astype(np.float64), views, kept / kept.sum())
