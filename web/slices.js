@@ -9,7 +9,7 @@ export const rounded = (x) => (x % 1 === 0.5 ? 2 * Math.round(x / 2) : Math.roun
 const MAX_KEPT = 1024;
 const kept = new Map();
 
-// Returns the slices for these diameters of discs, from near to far. shape: { kind, blades, rotation_deg, ring_inner }.
+// Returns the slices for these diameters of discs, from near to far. shape: as in optics.py.
 export function slicesOf(defocusPx, shape) {
     const sharp = NUMBERS.MIN_SPACING_PX / 2, ascending = (values) => Float64Array.from(values).sort();
     const near = ascending(defocusPx.filter((px) => px > sharp));
@@ -78,12 +78,17 @@ export function discTaps(shape, diameter, isReduced) {
 }
 
 // Returns a function of a place (t, s): the distance to the edge of an opening of diameter 1, positive inside.
-export function edgeDistance({ kind, blades, rotation_deg: turn, ring_inner: inner }) {
+export function edgeDistance({ kind, blades, rotation_deg: turn, ring_inner: inner, roundness: round }) {
     if (kind === "ring") return (t, s) => Math.min(0.5 - Math.hypot(t, s), Math.hypot(t, s) - 0.5 * inner);
     if (kind !== "polygon") return (t, s) => 0.5 - Math.hypot(t, s);
-    const half = Math.PI / blades, angles = Array.from({ length: blades }, (_, i) => turn * Math.PI / 180 + (2 * i + 1) * half);
-    const sides = angles.map((angle) => [Math.sin(angle), -Math.cos(angle)]);
-    return (t, s) => 0.5 * Math.cos(half) - Math.max(...sides.map(([across, down]) => s * across + t * down));
+    const half = Math.PI / blades, sides = Array.from({ length: blades }, (_, i) => {
+        const angle = turn * Math.PI / 180 + (2 * i + 1) * half;
+        return [Math.sin(angle), -Math.cos(angle)];
+    });
+    return (t, s) => {
+        const straight = 0.5 * Math.cos(half) - Math.max(...sides.map(([across, down]) => s * across + t * down));
+        return (1 - round) * straight + round * (0.5 - Math.hypot(t, s));
+    };
 }
 
 // Returns lower end, 1 / width, upper end, 1 / width of the weights of each slice, see viewer/gpu/refocus/discs.py.

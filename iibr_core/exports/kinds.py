@@ -168,7 +168,8 @@ EXPORTS = {
         optics="stereo:optics_of_eyes", needs=("pillow_heif",), purpose="display",
     ),
     "web": ExportKind(
-        "Web page, one file", (".html",), "web:write_page", ("budget", "credit", "target"),
+        "Web page, one file", (".html",), "web:write_page",
+        ("focus", "aperture", "budget", "credit", "target"),
         gallery="web_gallery:write_gallery",
     ),
     "mp4": _animation("Video, MP4", ".mp4", 30, needs=("av",)),

@@ -188,7 +188,7 @@ def open_for_export(
     ready = next(results_of(request, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     on_ready(ready.scene)
-    optics = Optics(gloss=lens.gloss)
+    optics = lens.optics_on(ready.scene, ready.centre.disparity)
     return ExportSource(ready.scene, ready.loaded, optics, _draw_nothing, ready.centre)
 
 

@@ -48,6 +48,7 @@ BLANK = re.compile(r"^\s+|[ \t]+$", re.MULTILINE)
 
 
 NO_STREAMS = " Safari will show the middle view only: streams of all views need PyAV; {}, and export again."
+ROUND = " Pages have no masks: the lens of this one is round."
 
 
 def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
@@ -60,6 +61,7 @@ def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
     return (
         f"{len(views.places)} views of {width}x{height} px{depth} at quality {views.form.quality}:"
         f" {len(page) / 1e6:.2f} MB.{'' if views.form.is_video else NO_STREAMS.format(how_to_install('export'))}"
+        f"{ROUND if source.optics.aperture_shape.kind == 'mask' else ''}"
     )
 
 

@@ -115,7 +115,7 @@ def test_views_that_an_aperture_adds_up_are_the_desktops(kind, step) -> None:
 
 SHAPES = (
     ApertureShape(),
-    ApertureShape("polygon", blades=5, rotation_deg=20.0),
+    ApertureShape("polygon", blades=5, rotation_deg=20.0, roundness=0.4),
     ApertureShape("ring", ring_inner=0.6),
     ApertureShape("cat_eye"),
 )

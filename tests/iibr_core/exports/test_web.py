@@ -148,6 +148,19 @@ def test_the_field_is_described_and_the_first_picture_is_the_middle(opened) -> N
     assert np.abs(first - next(opened.views()).colors).mean() < 4
 
 
+def test_the_page_opens_with_the_lens_that_is_chosen(opened):
+    lens = LensChoice(
+        focus=0.5, f_number=8.0, tilt=(0.2, 0.1), focus_range=0.25, blades=7, rotation=30.0, highlights=2.0
+    )
+    source = opened.scene.source
+    _, field = page_of(open_for_export(KIND, ExportOptions(), source, 1.0, lens, lambda scene: None, None))
+    optics = field["optics"]
+    assert field["unitFNumber"] / optics["aperture"] == pytest.approx(8.0)
+    assert (optics["focus"], optics["range"], optics["tilt"]) == (0.5, 0.25, [0.2, 0.1])
+    assert (optics["shape"]["kind"], optics["shape"]["blades"], optics["shape"]["rotation_deg"]) == ("polygon", 7, 30)
+    assert optics["highlights"] == pytest.approx(3 / 15)
+
+
 def test_streams_hold_each_view_as_one_frame_and_what_lies_behind(opened) -> None:
     text, field = page_of(opened)
     assert page_of(opened)[0] == text, "the same views give the same page"
