@@ -30,6 +30,8 @@ Target = Literal["headset"]
 HEADSET_GRID = GridShape(5, 9)
 """Grid of a photo's views for headsets: between both eyes lie three views, and a head moves more to the sides."""
 STACK_BITS = 8, 16
+MAX_SIDE_VIEWS = 33
+"""Largest number of views a side that the window offers."""
 DEFAULT_SIZE = ScreenSize(0, 0)
 DEFAULT_SECONDS = 4.0
 """Length of an animation."""
@@ -54,7 +56,8 @@ class ExportOptions:
     frames of an animation or pictures of a stack. rate: frames a second. row: row of an epipolar plane image. show:
     whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit. credit:
     whether the page names the photo's title, author and rights. target: device that shows the page, None for any
-    browser. layout: place of the depth map beside its picture. bits: bits a channel of the pictures of a stack.
+    browser. layout: place of the depth map beside its picture. bits: bits a channel of the pictures of a stack. grid:
+    views of a photo that are written, None for those of the scene.
     """
 
     size: ScreenSize = DEFAULT_SIZE
@@ -72,6 +75,7 @@ class ExportOptions:
     target: Target | None = None
     layout: DepthLayout = "right"
     bits: int = 8
+    grid: GridShape | None = None
 
 
 DEFAULT_OPTIONS = ExportOptions()
@@ -123,6 +127,7 @@ class ExportKind:
 MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
 EYES = ("focus", "aperture", "size", "eyes")
+GRID = ("grid",)
 STACK_FILES = r"(focus_\d+|all_in_focus)\.png|disparity\.pfm"
 CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.(txt|bin)"
 
@@ -143,12 +148,12 @@ def _animation(words: str, ending: str, rate: float, max_width_px: int = 0, need
 
 def _cameras(words: str, variant: str) -> ExportKind:
     write = "cameras:write_cameras"
-    return ExportKind(words, (), write, variant=variant, own_files=CAMERA_FILES, purpose="software")
+    return ExportKind(words, (), write, GRID, variant, own_files=CAMERA_FILES, purpose="software")
 
 
 def _light_field(words: str, variant: str, endings: tuple[str, ...] = ()) -> ExportKind:
     write = "cameras:write_light_field"
-    return ExportKind(words, endings, write, variant=variant, is_light_field=True, purpose="software")
+    return ExportKind(words, endings, write, GRID, variant, is_light_field=True, purpose="software")
 
 
 EXPORTS = {
@@ -193,6 +198,7 @@ EXPORTS = {
     "colmap": _cameras("Cameras, COLMAP", "colmap"),
     "hci": _light_field("Light field, HCI folder", "hci"),
     "eslf": _light_field("Light field, lenslet image", "eslf", ("_eslf.png",)),
+    "npz": ExportKind("Light field, NumPy arrays", (".npz",), "arrays:write_arrays", GRID, purpose="software"),
 }  # fmt: skip
 """The kinds by the name that the user types."""
 
@@ -222,6 +228,7 @@ def with_defaults(kind: ExportKind, options: ExportOptions, scene: Scene, optics
         frames=frames,
         rate=rate,
         row=options.row if options.row >= 0 else scene.height // 2,
+        grid=options.grid if options.grid is not None and scene.plan is not None else scene.grid,
     )
 
 

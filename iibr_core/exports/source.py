@@ -23,7 +23,7 @@ from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import SRGB, ColorSpace, ViewOffset, ViewUpdate
+from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset, ViewUpdate
 
 if TYPE_CHECKING:
     from iibr_core.formats.images.metadata import PictureMetadata
@@ -98,6 +98,18 @@ class ExportSource:
             report_progress(done, total, MAKING)
             yield view
         raise_if_stopped()
+
+    def with_grid(self, grid: GridShape) -> "ExportSource":
+        """Return a photo's scene with another number of views, whose outermost ones stay where they are."""
+        if self.loaded is None or grid == self.scene.grid:
+            return self
+        from iibr_core.scenes.opening import scene_of_photo
+
+        plan, source = self.plan(), replace(self.scene.source, grid=grid)
+        finer = max(max(plan.grid) - 1, 1) / max(max(grid) - 1, 1)
+        low, high = (value * finer for value in plan.disparity_range_px)
+        plan = replace(plan, grid=grid, disparity_scale=plan.disparity_scale * finer, disparity_range_px=(low, high))
+        return replace(self, scene=scene_of_photo(source, self.loaded, plan), centre=None)
 
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """Return the views from disk, with found disparity if the scene has it."""
@@ -195,6 +207,8 @@ def open_for_export(
 def write_export(kind: ExportKind, path: Path, source: ExportSource, options: ExportOptions) -> str | None:
     """Write an export of this kind; return a sentence about it for the user, or None."""
     filled = with_defaults(kind, options, source.scene, source.optics)
+    if "grid" in kind.supports and filled.grid is not None:
+        source = source.with_grid(filled.grid)
     message: str | None = kind.function(kind.write)(path, source, filled)
     if filled.rate < options.rate:
         return (

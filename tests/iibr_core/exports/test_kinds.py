@@ -1,6 +1,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import Optics
@@ -54,3 +55,16 @@ def test_a_folder_of_other_files_is_never_replaced(source, tmp_path, name) -> No
     mine.touch()
     with pytest.raises(InputError, match=r"mine\.png"):
         require_export_place(kind, folder, (), True)
+
+
+def test_a_photo_is_written_with_another_number_of_views(source, tmp_path) -> None:
+    usual = exported(source, "npz", tmp_path / "usual.npz")
+    finer = exported(source, "npz", tmp_path / "finer.npz", grid=GridShape(5, 5))
+    with np.load(usual) as few, np.load(finer) as many:
+        assert many["views"].shape == (5, 5, 64, 96, 3)
+        difference = np.abs(many["views"][::4, ::4].astype(int) - few["views"][::2, ::2])
+        assert difference.mean() < 0.5, "the outermost views stay where they are"
+        np.testing.assert_allclose(2 * many["disparity"][2, 2], few["disparity"][1, 1], rtol=1e-5)
+        assert many["offsets"][0, 4].tolist() == [-2.0, 2.0]
+    folder = exported(source, "hci", tmp_path / "hci", grid=GridShape(2, 2))
+    assert len(list(folder.glob("input_Cam*.png"))) == 4

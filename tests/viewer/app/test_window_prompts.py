@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.exports.kinds import ExportOptions
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver
 from viewer.app.main_loop import App
 from viewer.app.pace import NoticeClock
@@ -92,6 +94,15 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver) -> None:
     is_beside = tip.pos.x + tip.size.x <= prompt.pos.x
     assert is_beside or tip.pos.y >= prompt.pos.y + prompt.size.y or tip.pos.y + tip.size.y <= prompt.pos.y
     assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
+
+
+def test_the_number_of_views_of_a_light_field_is_set_in_the_prompt(viewer: Driver) -> None:
+    viewer.app.do(do(messages.show_prompt, ExportPrompt("hci", "field")))
+    viewer.press("##views", "prompt ExportPrompt")
+    viewer.type("5")
+    prompt = viewer.app.state.prompt
+    assert isinstance(prompt, ExportPrompt)
+    assert prompt.options == ExportOptions(grid=GridShape(5, 5))
 
 
 def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer: Driver) -> None:

@@ -15,19 +15,21 @@ from iibr_core.exports.kinds import EXPORTS, AnimationKind, ExportKind, ExportOp
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import InputError
+from iibr_core.types import GridShape, InputError
 from viewer.model import messages, saving
 from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import is_seen_open
 from viewer.model.state.prompts import ExportPrompt
 from viewer.model.state.tasks import ExportTask
-from viewer.ui.overlays.prompt_rows import choice_row, place_actions, place_row, size_row, text_field
-from viewer.ui.widgets import checkbox, choices, gap, label, quiet, slider
+from viewer.ui.overlays.prompt_rows import WIDTH_FIELD, choice_row, place_actions, place_row, size_row, text_field
+from viewer.ui.widgets import checkbox, choices, gap, label, quiet, scale, slider
 
 ADVANCED_ROWS = ("keys",)
 """Rows that are shown once the panel's advanced section was opened."""
 ANY_DISPLAY = "any"
+MIN_SPAN_PX = 1e-3
+"""Smallest span of disparity that 3D strength counts with, in pixels per view step."""
 PICTURE, PICTURE_ENTRY = "picture", ("Picture: PNG, JPEG, …", "The picture as it looks now, at any size.")
 PURPOSE_TIPS: dict[Purpose, str] = {
     "share": "Files that everyone can view without this program.",
@@ -74,9 +76,6 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     kind, scene = EXPORTS[chosen], state.scene
     is_advanced = is_seen_open("advanced", state.preferences.open_sections)
     edited = replace(prompt, options=_option_rows(prompt.options, _Export(kind, scene, state.optics), is_advanced))
-    if kind.is_light_field:
-        label("Views", "Set the number of views with `iibr generate PHOTO --grid`.")
-        imgui.text(f"{scene.grid.rows} x {scene.grid.columns} of {scene.width} x {scene.height} pixels")
     row_of_path = place_row("File" if kind.endings else "Folder", prompt.path, state, prompt.problem)
     written = _written_name(kind, edited, scene)
     if written and written != Path(prompt.path.strip()).name:
@@ -141,9 +140,27 @@ def _keys(options: ExportOptions, export: _Export) -> ExportOptions:
 
 
 def _eyes(options: ExportOptions, export: _Export) -> ExportOptions:
-    limits = 0.0, float(max(export.scene.grid.columns - 1, 1))
-    tip = "Distance between the eyes, in views. More looks deeper. What is in focus lies on the screen."
-    return replace(options, eyes=slider("3D strength", options.eyes, limits, "%.1f", tip))
+    scene, (far, near) = export.scene, export.scene.disparity_range_px
+    percent = 100 * max(near - far, MIN_SPAN_PX) / scene.width  # of the width, for eyes one view apart
+    shown = percent * options.eyes
+    tip = "How far the nearest moves against the farthest, of the width. What is in focus lies on the screen."
+    new = slider("3D strength", shown, (0.0, percent * max(scene.grid.columns - 1, 1)), "%.1f %%", tip)
+    return options if new == shown else replace(options, eyes=new / percent)
+
+
+def _grid(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Views", "Number of views a side. More make smaller steps between the same outermost views.")
+    scene, grid = export.scene, options.grid or export.scene.grid
+    size = f"of {scene.width} x {scene.height} pixels"
+    if scene.plan is None:
+        imgui.text(f"{grid.rows} x {grid.columns} {size}")
+        return options
+    imgui.set_next_item_width(WIDTH_FIELD * scale())
+    changed, side = imgui.input_int("##views", grid.columns, 0, 0)
+    imgui.same_line()
+    imgui.text(f"x {grid.rows} {size}")
+    side = min(max(side, 1), kinds.MAX_SIDE_VIEWS)
+    return replace(options, grid=GridShape(side, side)) if changed else options
 
 
 def _row(options: ExportOptions, export: _Export) -> ExportOptions:
@@ -223,6 +240,7 @@ ROWS: dict[str, Row] = {
     "keys": _keys,
     "eyes": _eyes,
     "row": _row,
+    "grid": _grid,
     "size": _size,
     "frames": _frames,
     "rate": _rate,
