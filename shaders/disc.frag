@@ -1,6 +1,6 @@
 #version 330 core
 // A slice, blurred by its disc.
-const int MAX_TAPS = 320;
+const int MAX_TAPS = 768;
 
 layout(std140) uniform Taps {
     vec4 taps[MAX_TAPS];  // x, y from the middle, px of the slice; weight

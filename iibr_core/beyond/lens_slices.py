@@ -7,6 +7,7 @@ Plain arrays, no GL; web/renderer.js has the same.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -26,16 +27,22 @@ COARSER = 1.25
 """Factor on the differences if there are too many slices."""
 SHARP_PX = 0.7
 """Diameter of a disc, in pixels, that blurs nothing."""
-WIDEST_TEXELS = 19.0
-"""Diameter of a disc, in pixels of the size at which it is drawn, from which on the size is halved."""
-MAX_TAPS = 320
+FULL_SIZE_PX = 12.0
+"""Largest diameter of a disc that is drawn at full size, in pixels."""
+WIDER_A_LEVEL = 2.5
+"""Factor from one halving of the size to the next on the largest diameter: wider discs have more pixels."""
+MAX_TAPS = 768
 """Largest number of samples of a disc: a square mask turned by 45 degrees takes as many."""
+MIN_TAP = 1e-4
+"""Smallest weight of a sample, in covered pixels."""
 SUBSAMPLES = 4
 """Samples of the aperture across a pixel."""
 STEPS_A_TEXEL = 16
 """Number of different diameters of a disc for each pixel of the size at which it is drawn."""
-REDUCTION_BLUR = 16 / 6
-"""Square of the diameter of the disc, in reduced pixels, that blurs as much as reduction and enlargement."""
+REDUCTION_BLUR = 1 / 12 + 1 / 12 + 1 / 6
+"""Variance along an axis, in squared reduced pixels, of all that blurs a reduced slice beside its disc: the means over
+pixels of the slice and of the disc, and linear interpolation at the end.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +51,7 @@ class Slice:
 
     diameter_px: of its disc, negative behind the focus. level: binary logarithm of the reduction. taps (N, 3): samples
     of the disc as (x, y, weight), in reduced pixels from the middle, each the mean of up to four pixels; their weights
-    sum to 1.
+    sum to 1, some are negative.
     """
 
     diameter_px: float
@@ -88,7 +95,8 @@ def _means(values: Doubles, factor: float) -> list[float]:
 
 
 def _slice(diameter_px: float, shape: ApertureShape) -> Slice:
-    level = max(int(np.floor(np.log2(max(abs(diameter_px), 1e-9) / WIDEST_TEXELS))) + 1, 0)
+    wider = max(abs(diameter_px) / FULL_SIZE_PX, 1.0)
+    level = math.ceil(math.log(wider, WIDER_A_LEVEL) - 1e-9)
     texels = round(diameter_px / 2.0**level * STEPS_A_TEXEL) / STEPS_A_TEXEL
     return Slice(diameter_px, level, disc_taps(shape, texels, level > 0))
 
@@ -98,22 +106,34 @@ def disc_taps(shape: ApertureShape, diameter: float, is_reduced: bool) -> Double
     """Return the samples of a disc, see `Slice.taps`. diameter: in pixels of the size at which it is drawn."""
     if abs(diameter) < SHARP_PX:
         return np.array([[0.0, 0.0, 1.0]])
-    # Reduction and enlargement blur, too: the disc is smaller by as much, so that the whole has its width.
-    diameter *= (1 - (REDUCTION_BLUR / diameter**2 if is_reduced else 0.0)) ** 0.5
-    half = 2 * (int(np.ceil(abs(diameter) * _reach(shape) / 2 + 0.5)) // 2 + 1)
+    half = 2 * (int(np.ceil(abs(diameter) * _reach(shape) / 2 + 1.5)) // 2 + 1)
     fine = (np.arange(2 * half * SUBSAMPLES) + 0.5) / SUBSAMPLES - half - 0.5
     t, s = np.meshgrid(fine / diameter, fine / diameter, indexing="ij")
     covered = opening(shape, t, s, 1.0, 1 / (SUBSAMPLES * abs(diameter)))
     covered = covered.reshape(2 * half, SUBSAMPLES, 2 * half, SUBSAMPLES).mean(axis=(1, 3))
-    # One bilinear sample for two by two pixels has their weights along rows and along columns.
-    cells = covered.reshape(half, 2, half, 2)
+    if is_reduced:
+        covered = _sharpened(covered)
+    taps = np.concatenate([_bilinear_taps(np.maximum(covered, 0.0)), _bilinear_taps(np.minimum(covered, 0.0))])
+    return taps / [1.0, 1.0, taps[:, 2].sum()] if len(taps) else np.array([[0.0, 0.0, 1.0]])
+
+
+def _sharpened(kernel: Doubles) -> Doubles:
+    """Return a kernel whose variance is less by REDUCTION_BLUR: all together then blurs as the kernel alone."""
+    around = np.pad(kernel, 1)
+    beside = around[:-2, 1:-1] + around[2:, 1:-1] + around[1:-1, :-2] + around[1:-1, 2:]
+    return kernel - REDUCTION_BLUR / 2 * (beside - 4 * kernel)
+
+
+def _bilinear_taps(kernel: Doubles) -> Doubles:
+    """Return samples (x, y, weight) of a kernel of one sign: one bilinear sample has the weights of two by two pixels
+    along rows and along columns.
+    """
+    half = len(kernel) // 2
+    cells = kernel.reshape(half, 2, half, 2)
     weight = cells.sum(axis=(1, 3))
-    with np.errstate(invalid="ignore"):
-        x, y = cells[:, :, :, 1].sum(axis=1) / weight, cells[:, 1].sum(axis=2) / weight
-    row, column = np.nonzero(weight > 1e-4)
-    at = row, column
-    taps = np.stack([2 * column - half + x[at], 2 * row - half + y[at], weight[at] / weight.sum()], axis=1)
-    return taps if len(taps) else np.array([[0.0, 0.0, 1.0]])
+    row, column = at = np.nonzero(np.abs(weight) > MIN_TAP)
+    x, y = cells[:, :, :, 1].sum(axis=1)[at] / weight[at], cells[:, 1].sum(axis=2)[at] / weight[at]
+    return np.stack([2 * column - half + x, 2 * row - half + y, weight[at]], axis=1)
 
 
 def _reach(shape: ApertureShape) -> float:
