@@ -18,6 +18,7 @@ in vec2 uv;
 layout(location = 0) out vec4 light;
 layout(location = 1) out vec4 disc;
 
+const float NOWHERE = 4e6;         // diameter where there is no surface, as in slices.glsl: no slice has it
 const float MIN_STEP_PX = 1.0;     // least difference of discs at a depth edge
 const float SLOPE_SHARE = 0.25;    // as in iibr_core/surfaces.py
 const float OUTLINE_SHARE = 0.08;  // as in iibr_core/method/mixed_pixels.py
@@ -58,14 +59,14 @@ Mixed mixed_at(ivec2 at) {
     }
     vec3 color = light_of(at);
     Mixed mixed = Mixed(0.0, near, color, color);
+    if (near - here <= edge || here - far > SLOPE_SHARE * (near - here)) return mixed;
     towards /= max(length(towards), 1e-6);
     vec3 foreground = light_of(at + ivec2(round(2.0 * step_px * towards)));
     vec3 background = light_of(at - ivec2(round(1.5 * step_px * towards)));
     vec3 contrast = foreground - background;
     float share = dot(color - background, contrast) + OUTLINE_TRUST * OUTLINE_SHARE * beside;
     share = clamp(share / (dot(contrast, contrast) + OUTLINE_TRUST), 0.0, 0.95);
-    bool is_edge = near - here > edge && here - far <= SLOPE_SHARE * (near - here);
-    if (is_edge && share > 0.02) {
+    if (share > 0.02) {
         // Both together are the pixel again.
         vec3 left = (color - share * foreground) / (1.0 - share);
         mixed.background = clamp(left, min(background, color), max(background, color));
@@ -86,10 +87,13 @@ void main() {
         found = clamp(place + disparity * eye, 0.0, 1.0);
         disparity = textureLod(hidden_disparity, found, 0.0).r;
     }
-    vec4 root = textureLod(hidden, found, 0.0);
+    light = vec4(0.0);
+    disc = vec4(NOWHERE);
     bool is_found = length((disparity - last) * eye * hidden_size_px) <= 1.0;
-    float known = root.a > 0.5 && is_found && (front - disparity * hidden_scale) * disc_px > 0.5 ? 1.0 : 0.0;
-    light = known * vec4(light_from_root(root).rgb, 1.0);
+    if (!is_found || (front - disparity * hidden_scale) * disc_px <= 0.5) return;
+    vec4 root = textureLod(hidden, found, 0.0);
+    if (root.a <= 0.5) return;
+    light = vec4(light_from_root(root).rgb, 1.0);
     disc = vec4(defocus_of(disparity * hidden_scale));
 }
 #else
@@ -98,7 +102,7 @@ void main() {
     Mixed mixed = mixed_at(at);
 #ifdef FRINGE
     light = mixed.share * vec4(mixed.foreground, 1.0);
-    disc = vec4(defocus_of(mixed.disparity));
+    disc = vec4(mixed.share > 0.0 ? defocus_of(mixed.disparity) : NOWHERE);
 #else
     light = vec4(mixed.background, 1.0);
     disc = vec4(defocus_of(seen_at(at)));

@@ -70,9 +70,13 @@ class Program:
         if (block := self._program.get(name, None)) is not None:
             block.binding = 0
 
-    def draw(self, vertices: int = 3) -> None:
-        """Draw triangles; three vertices cover the whole target."""
-        self._corners.render(moderngl.TRIANGLES, vertices=vertices)
+    def draw(self) -> None:
+        """Draw a triangle that covers the whole target."""
+        self._corners.render(moderngl.TRIANGLES, vertices=3)
+
+    def draw_points(self, count: int) -> None:
+        """Draw points, whose size the vertex shader sets."""
+        self._corners.render(moderngl.POINTS, vertices=count)
 
     def release(self) -> None:
         """Free the program."""

@@ -14,10 +14,11 @@ from typing import Any
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.beyond.lens_slices import MAX_SLICES, MAX_TAPS, Slice
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.light_field_texture import LightFieldTexture, box_around
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.refocus.picture_lens import BARREL_EDGE, Lens, grown
 from viewer.gpu.render_targets import clear
@@ -26,15 +27,17 @@ TILE_PX = 512
 """Side of a tile in pixels."""
 MAX_ATLAS_PX = 8192
 """Largest height of the texture that holds all slices of a tile, in pixels."""
-BLOCK_PX, MAX_REACH_BLOCKS = 32, 7
+BLOCK_PX, MAX_REACH_BLOCKS = 16, 12
 """Side of the blocks whose slices are known, in pixels of the picture, and the farthest that light comes, in blocks."""
+ALIGNED_PX = 4
+"""Software GL draws squares of so many pixels: blocks that lie on them cost least."""
 BINS = 128
 """Number of ranges of defocus whose slices are looked up, as in shaders/occupancy.frag."""
 SURFACES = ("FRINGE", "", "BEHIND")
 """Switches of shaders/surfaces.frag, one below the other in the textures."""
 Box = tuple[int, int, int, int]
 """Left, top, right and bottom of a tile, in pixels of the picture."""
-PINHOLE, SEEN, HIDDEN, HIDDEN_DISPARITY, SURFACE, DEFOCUS, OCCUPANCY, ATLAS = range(8)
+PINHOLE, SEEN, HIDDEN, HIDDEN_DISPARITY, SURFACE, DEFOCUS, BLOCKS, ATLAS = range(8)
 """Texture units."""
 
 
@@ -43,7 +46,7 @@ class _Place:
     """A slice of a tile in the textures. source, target: first pixel (x, y) of the slice, and of its blurred picture.
 
     size, blurred_size: (width, height) of both. origin: first pixel of the slice in the surfaces, px of the picture.
-    pad: pixels of the slice around the blurred picture. reach: blocks from which light comes.
+    pad: pixels of the slice around the blurred picture.
     """
 
     index: int
@@ -54,7 +57,6 @@ class _Place:
     blurred_size: tuple[int, int]
     origin: tuple[int, int]
     pad: int
-    reach: int
 
     @property
     def texel(self) -> int:
@@ -82,9 +84,8 @@ class _Target:
 class Discs:
     """Draws pictures through open lenses. Call it only from the thread of its context."""
 
-    def __init__(self, ctx: moderngl.Context, programs: ProgramCache, dtype: str = "f4") -> None:
-        """dtype: of light, "f4" or "f2"."""
-        self._ctx, self._programs, self._dtype = ctx, programs, dtype
+    def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
+        self._ctx, self._programs = ctx, programs
         self._taps = ctx.buffer(reserve=MAX_SLICES * MAX_TAPS * 16)
         self._textures: dict[str, Any] = {}
         self._framebuffers: dict[tuple[str, ...], Any] = {}
@@ -108,15 +109,16 @@ class Discs:
         pinhole, seen: light and disparity of the picture and `lens.margin_px` around it.
         """
         self._ctx.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._ctx.enable(moderngl.PROGRAM_POINT_SIZE)
         region, size_px = ScreenSize(*pinhole.size), ScreenSize(*target.size)
         self._write_taps(lens)
         self._draw_surfaces(field, lens, pinhole, seen, region)
         block_px = _block_px(lens.slices)
-        self._draw_occupancy(lens, region, block_px)
+        reached = self._draw_occupancy(lens, region, block_px)
         for top, left in itertools.product(range(0, size_px.height, TILE_PX), range(0, size_px.width, TILE_PX)):
             box = left, top, min(left + TILE_PX, size_px.width), min(top + TILE_PX, size_px.height)
             self._ctx.disable(moderngl.BLEND)
-            self._draw_tile(field, lens, box, target, block_px)
+            self._draw_tile(field, lens, box, target, reached, block_px)
             yield
 
     def _draw_surfaces(
@@ -128,7 +130,7 @@ class Discs:
         region: ScreenSize,
     ) -> None:
         width, height = region
-        self._texture("light", (width, len(SURFACES) * height), 4, self._dtype)
+        self._texture("light", (width, len(SURFACES) * height), 4, "f2")
         self._texture("defocus", (width, len(SURFACES) * height), 1, "f4")
         framebuffer = self._framebuffer("light", "defocus")
         clear(framebuffer)
@@ -158,7 +160,8 @@ class Discs:
                 program.set_uniforms(dolly=lens.dolly, behind_eye=lens.behind_eye, hidden_scale=lens.hidden_scale)
             program.draw()
 
-    def _draw_occupancy(self, lens: Lens, region: ScreenSize, block_px: int) -> None:
+    def _draw_occupancy(self, lens: Lens, region: ScreenSize, block_px: int) -> NDArray[np.uint32]:
+        """Draw the slices that each block has, and return those whose light comes into it, a bit for each."""
         size = -(-region.width // block_px), -(-region.height // block_px)
         self._texture("occupancy", size, 1, "u4")
         self._framebuffer("occupancy").use()
@@ -173,6 +176,17 @@ class Discs:
         self._use_surfaces(program, region)
         program.set_uniforms(bins=[int(each) for each in bins], bin_of=(scale, 1 - far * scale), block_px=block_px)
         program.draw()
+        self._texture("reach", size, 1, "u4")
+        self._framebuffer("reach").use()
+        self._textures["occupancy"].use(BLOCKS)
+        program = self._programs.get("reach.frag")
+        reach_px = [_reach_px(each) for each in lens.slices]
+        wanted = [
+            sum(1 << i for i, each in enumerate(reach_px) if each > away * block_px) for away in range(MAX_REACH_BLOCKS)
+        ]
+        program.set_uniforms(occupancy=BLOCKS, wanted=wanted, reach=math.ceil(max(reach_px) / block_px))
+        program.draw()
+        return np.frombuffer(self._textures["reach"].read(), np.uint32).reshape(size[::-1])
 
     def _draw_tile(
         self,
@@ -180,13 +194,15 @@ class Discs:
         lens: Lens,
         box: Box,
         target: moderngl.Framebuffer,
+        reached: NDArray[np.uint32],
         block_px: int,
     ) -> None:
-        places, sheet, blurred_sheet = _places(lens, box, block_px)
-        self._texture("slices", sheet, 4, self._dtype)
-        self._texture("blurred", blurred_sheet, 4, self._dtype)
-        self._textures["occupancy"].use(OCCUPANCY)
+        places, sheet, blurred_sheet = _places(lens, box, reached, block_px)
+        self._texture("slices", sheet, 4, "f2")
+        self._texture("blurred", blurred_sheet, 4, "f2")
+        self._textures["occupancy"].use(BLOCKS)
         self._draw_slices(lens, places, block_px)
+        self._textures["reach"].use(BLOCKS)
         self._blur_slices(lens, places, box, target, field, block_px)
         self._composite(lens, places, box, target, block_px)
 
@@ -199,8 +215,7 @@ class Discs:
         for place in places:
             program.set_uniforms(tent=tents[place.index], origin=place.origin, corner=place.source, texel=place.texel)
             target = _Target(place.source, place.size, place.origin, place.texel)
-            wanted = [1 << place.index] * (MAX_REACH_BLOCKS + 1)
-            self._draw_blocks(program, framebuffer, target, wanted, int(place.texel > block_px), block_px)
+            self._draw_blocks(program, framebuffer, target, 1 << place.index, block_px)
 
     def _blur_slices(
         self,
@@ -224,7 +239,7 @@ class Discs:
                 aspect = field.height / field.width * lens.field_part.width / lens.field_part.height
                 _set_barrel(program, lens, place, ScreenSize(*target.size), aspect)
             blurred = _Target(place.target, place.blurred_size, place.first, place.texel)
-            self._draw_blocks(program, framebuffer, blurred, _wanted([place]), place.reach, block_px)
+            self._draw_blocks(program, framebuffer, blurred, 1 << place.index, block_px)
 
     def _composite(
         self, lens: Lens, places: list[_Place], box: Box, target: moderngl.Framebuffer, block_px: int
@@ -238,35 +253,36 @@ class Discs:
             table[place.index] = (x, y, 1 / place.texel, 0.0)
         program.set_uniforms(atlas=ATLAS, places=table)
         picture = _Target((left, top), (right - left, bottom - top), (left + margin, top + margin), 1)
-        self._draw_blocks(program, target, picture, _wanted(places), max(each.reach for each in places), block_px)
+        self._draw_blocks(program, target, picture, (1 << len(lens.slices)) - 1, block_px)
 
     def _draw_blocks(
         self,
         program: Program,
         framebuffer: moderngl.Framebuffer,
         target: _Target,
-        wanted: list[int],
-        reach: int,
+        wanted: int,
         block_px: int,
     ) -> None:
-        """Draw the blocks of a target in which slices have something within reach, see shaders/blocks.vert."""
-        (width, height), texel, step = framebuffer.size, target.texel, block_px / target.texel
-        first = [math.floor(target.origin[i] / block_px) for i in (0, 1)]
-        last = [math.ceil((target.origin[i] + target.size[i] * texel) / block_px) for i in (0, 1)]
-        count = [last[i] - first[i] for i in (0, 1)]
-        x, y = (target.corner[i] - target.origin[i] / texel for i in (0, 1))
-        framebuffer.viewport = 0, 0, width, height
+        """Draw the blocks of a target that have some of the wanted slices, a bit for each, see shaders/blocks.vert."""
+        (width, height), texel, point_blocks = framebuffer.size, target.texel, _point_blocks(target.texel, block_px)
+        point_px = point_blocks * block_px
+        first = [target.origin[i] // point_px for i in (0, 1)]
+        last = [math.ceil((target.origin[i] + target.size[i] * texel) / point_px) for i in (0, 1)]
+        across, down = (last[i] - first[i] for i in (0, 1))
+        x, y = (target.corner[i] - (target.origin[i] - first[i] * point_px) // texel for i in (0, 1))
+        side = point_px // texel
+        framebuffer.viewport = x, y, across * side, down * side
         framebuffer.scissor = *target.corner, *target.size
         framebuffer.use()
         program.set_uniforms(
-            occupancy=OCCUPANCY,
+            occupancy=BLOCKS,
             wanted=wanted,
-            reach=reach,
-            blocks=(*first, *count),
-            target_of_blocks=(2 * x / width - 1, 2 * y / height - 1, 2 * step / width, 2 * step / height),
+            points=(*first, across, down),
+            point_blocks=point_blocks,
+            point_px=float(side),
         )
-        program.draw(6 * count[0] * count[1])
-        framebuffer.scissor = 0, 0, width, height
+        program.draw_points(across * down)
+        framebuffer.viewport = framebuffer.scissor = 0, 0, width, height
 
     def _use_surfaces(self, program: Program, region: ScreenSize) -> None:
         self._textures["light"].use(SURFACE)
@@ -305,9 +321,9 @@ class Discs:
         self._textures.pop(name).release()
 
 
-def _wanted(places: list[_Place]) -> list[int]:
-    """Return the slices that reach so many blocks, a bit for each."""
-    return [sum(1 << each.index for each in places if away <= each.reach) for away in range(MAX_REACH_BLOCKS + 1)]
+def _reach_px(each: Slice) -> float:
+    """Return the distance from which light of a slice comes when it is enlarged, in pixels."""
+    return each.reach_px + 2.0**each.level
 
 
 def _set_barrel(program: Program, lens: Lens, place: _Place, size_px: ScreenSize, aspect: float) -> None:
@@ -325,9 +341,8 @@ def _set_barrel(program: Program, lens: Lens, place: _Place, size_px: ScreenSize
 
 def _block_px(slices: tuple[Slice, ...]) -> int:
     """Return the side of blocks for which light comes from at most MAX_REACH_BLOCKS away."""
-    farthest = max(each.reach_px + 2 * (1 << each.level) for each in slices)
-    block_px = BLOCK_PX
-    while farthest > (MAX_REACH_BLOCKS - 1) * block_px:
+    farthest, block_px = max(map(_reach_px, slices)), max(BLOCK_PX, max(1 << each.level for each in slices))
+    while farthest > MAX_REACH_BLOCKS * block_px:
         block_px *= 2
     return block_px
 
@@ -344,17 +359,28 @@ def _tents(slices: tuple[Slice, ...]) -> list[tuple[float, float, float, float]]
     return tents
 
 
-def _places(lens: Lens, box: Box, block_px: int) -> tuple[list[_Place], tuple[int, int], tuple[int, int]]:
-    """Return the places of all slices of a tile, and the sizes of both textures."""
-    margin, places = lens.margin_px, []
-    shelves, blurred_shelves = _Shelves(), _Shelves()
+def _places(
+    lens: Lens, box: Box, reached: NDArray[np.uint32], block_px: int
+) -> tuple[list[_Place], tuple[int, int], tuple[int, int]]:
+    """Return the places of the slices that a tile shows, and the sizes of both textures.
+
+    reached: slices whose light comes into each block of the picture and its margin, a bit for each.
+    """
+    shelves, blurred_shelves, places = _Shelves(), _Shelves(), []
+    left, top, right, bottom = (each + lens.margin_px for each in box)
+    first = left // block_px, top // block_px
+    tile = reached[first[1] : -(-bottom // block_px), first[0] : -(-right // block_px)]
     for index, each in enumerate(lens.slices):
+        there = (tile >> index & 1).astype(bool)
+        if not there.any():
+            continue
         texel = 1 << each.level
-        pad = math.ceil(float(np.abs(each.taps[:, :2]).max())) + 1
-        beside = 2 if each.level else 0
-        first = [math.floor((box[i] + margin) / texel) - beside for i in (0, 1)]
-        blurred = [math.ceil((box[2 + i] + margin) / texel) + beside - first[i] for i in (0, 1)]
-        size = [extent + 2 * pad for extent in blurred]
+        beside, unit = texel if each.level else 0, _point_blocks(texel, block_px) * block_px
+        ends = box_around(there)[::-1]
+        low = [((first[i] + ends[i].start) * block_px - beside) // unit for i in (0, 1)]
+        high = [-((-(first[i] + ends[i].stop) * block_px - beside) // unit) for i in (0, 1)]
+        pad = math.ceil(each.reach_px / unit)
+        blurred, size = ([(high[i] - low[i] + 2 * extra) * unit // texel for i in (0, 1)] for extra in (0, pad))
         places.append(
             _Place(
                 index,
@@ -363,16 +389,20 @@ def _places(lens: Lens, box: Box, block_px: int) -> tuple[list[_Place], tuple[in
                 blurred_shelves.add(*blurred),
                 (size[0], size[1]),
                 (blurred[0], blurred[1]),
-                ((first[0] - pad) * texel, (first[1] - pad) * texel),
-                pad,
-                math.ceil((each.reach_px + texel) / block_px),
+                ((low[0] - pad) * unit, (low[1] - pad) * unit),
+                pad * unit // texel,
             )
         )
     return places, shelves.size, blurred_shelves.size
 
 
+def _point_blocks(texel: int, block_px: int) -> int:
+    """Return the side of a point in blocks, so that it has ALIGNED_PX pixels at least."""
+    return max(ALIGNED_PX * texel // block_px, 1)
+
+
 class _Shelves:
-    """Places rectangles below each other, in columns. size: of all together."""
+    """Places rectangles below each other, in columns, on whole multiples of ALIGNED_PX. size: of all together."""
 
     def __init__(self) -> None:
         self._left, self._width, self._top, self._height = 0, 0, 0, 0
@@ -380,9 +410,9 @@ class _Shelves:
     def add(self, width: int, height: int) -> tuple[int, int]:
         """Return the corner (x, y) of another rectangle."""
         if self._top + height > MAX_ATLAS_PX:
-            self._left, self._width, self._top = self._left + self._width, 0, 0
+            self._left, self._width, self._top = self._left + -(-self._width // ALIGNED_PX) * ALIGNED_PX, 0, 0
         corner = self._left, self._top
-        self._top += height
+        self._top += -(-height // ALIGNED_PX) * ALIGNED_PX
         self._width, self._height = max(self._width, width), max(self._height, self._top)
         return corner
 

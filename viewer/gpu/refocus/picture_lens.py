@@ -22,6 +22,8 @@ BARREL_EDGE = 1 / 16
 """Width of the edge of a cat's-eye, as a share of the aperture's diameter."""
 TILT_STEPS = 17
 """Number of places across the picture at which a tilted focus is looked at."""
+MARGIN_STEP_PX = 4
+"""Pixels of which the margin is a multiple: software GL draws squares of so many pixels."""
 EDGE_MARGIN_PX = 4
 """Pixels around the discs that edges and reductions need."""
 
@@ -66,7 +68,12 @@ class Lens:
     @property
     def margin_px(self) -> int:
         """Width of the border around the picture whose light the discs spread into it, in output pixels."""
-        return math.ceil(max(each.reach_px for each in self.slices)) + EDGE_MARGIN_PX if self.slices else 0
+        if not self.slices:
+            return 0
+        return (
+            -(-math.ceil(max(each.reach_px for each in self.slices) + EDGE_MARGIN_PX) // MARGIN_STEP_PX)
+            * MARGIN_STEP_PX
+        )
 
     def barrel(self, aspect: float) -> tuple[float, float, float]:
         """Return the motion of the barrel's opening across the picture (s, t) and its radius, in radii of the opening.
