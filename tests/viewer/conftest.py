@@ -1,15 +1,11 @@
 """Small scenes on disk, a private X server, and the viewer driven step by step until something is true."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 import time
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,13 +14,6 @@ from iibr_core.types import GridShape
 from tests.xvfb import private_display
 from viewer.model import messages
 from viewer.model.action import do
-
-if TYPE_CHECKING:
-    from viewer.app.main_loop import App
-    from viewer.display.offscreen import OffscreenScene
-    from viewer.model.action import Action
-    from viewer.model.state.app_state import AppState
-    from viewer.model.state.preferences import Section
 
 WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
@@ -41,7 +30,7 @@ DEADLINE_S = 120.0
 """For a condition that always comes true; generous, because the first run compiles the core."""
 
 
-def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
+def write_scene(folder, name="scene", seed=0):
     """A photo with its sidecar: a near red square, in the middle, before a far grey wall. Returns the photo's path."""
     from iibr_core.formats.images.write import write_image
 
@@ -57,7 +46,7 @@ def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
 
 
 @contextmanager
-def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[OffscreenScene]:
+def headless_with_scene(folder, *open_sections):
     """A scene opened without a window, its notices gone; open_sections: of the panel, with those that they lie in, the
     ones that are used most if none. The panel is there however narrow the window is.
     """
@@ -75,7 +64,7 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Offsc
 
 
 @pytest.fixture
-def viewer(opened: OffscreenScene) -> Iterator[OffscreenScene]:
+def viewer(opened):
     """What a module's `opened` gives, its state put back after every test."""
     before = opened.state
     yield opened
@@ -83,25 +72,25 @@ def viewer(opened: OffscreenScene) -> Iterator[OffscreenScene]:
 
 
 @pytest.fixture(scope="session")
-def display() -> Iterator[str]:
+def display():
     """A private X server; DISPLAY names it while the session runs."""
     with private_display() as name:
         yield name
 
 
-def reduce(state: AppState, action: Action) -> AppState:
+def reduce(state, action):
     """The state after an action."""
     return action.apply(state)
 
 
-def rests(app: App) -> bool:
+def rests(app):
     """Whether nothing is left to do in a window, and nothing to be looked for soon."""
     from viewer.app import main_loop
 
     return app.wait_s == main_loop.IDLE_WAIT_S
 
 
-def has_all_views(state: AppState) -> bool:
+def has_all_views(state):
     """Whether all views are there, made with the newest settings: progress is that of the views before until then."""
     return state.progress.is_complete and state.shown_generation == state.generation
 
@@ -110,31 +99,40 @@ def has_all_views(state: AppState) -> bool:
 class Driver:
     """A viewer in a window, its loop turned by the test, its mouse and keys moved by the X server."""
 
-    app: App
+    app: Any
 
-    def until(self, condition: Callable[[App], bool]) -> None:
+    def until(self, condition):
         """Turn the loop until the condition holds."""
         end = time.monotonic() + DEADLINE_S
         while not condition(self.app):
             assert time.monotonic() < end, f"never came true; state: {self.app.state}"
             self.app.step()
 
-    def until_idle(self) -> None:
+    def until_idle(self):
         """Turn the loop until every view is there and nothing is left to do; what was sent before is heard first."""
         self.app.step()
         self.until(lambda app: has_all_views(app.state) and rests(app))
 
-    def send(self, *words: object) -> None:
+    def settle(self, condition):
+        """Turn the loop until the condition holds, and until nothing is left to do."""
+        self.until(condition)
+        self.until_idle()
+
+    def do(self, *actions):
+        """Do something that no hand does, and turn the loop until nothing is left to do."""
+        self.app.do(*actions)
+        self.until_idle()
+
+    def send(self, *words):
         """Let xdotool do something."""
         subprocess.run(["xdotool", *map(str, words)], check=True)
 
-    def position(self, x_share: float, y_share: float) -> tuple[int, int]:
+    def position(self, x_share, y_share):
         """Screen position of a place in the picture, as shares of its width and height."""
         picture = self.app.layout().picture
-        assert picture is not None
         return round(picture.x + x_share * picture.width), round(picture.y + y_share * picture.height)
 
-    def find(self, widget: str, window: str = "panel") -> tuple[int, int]:
+    def find(self, widget, window="panel"):
         """Move the pointer onto the widget of this ImGui name in a window, and say where that is; where it is not to be
         seen, scroll down.
         """
@@ -150,12 +148,12 @@ class Driver:
             assert before < frame.scroll_max.y, f"no {widget} in {window}"
             self.send("mousemove", round(frame.pos.x + frame.size.x / 2), round(frame.pos.y + frame.size.y / 2))
             self.send("click", "--repeat", 5, SCROLL_DOWN)
-            self.until(lambda app, before=before: frame.scroll.y > before)  # type: ignore[misc]
+            self.until(lambda app, before=before: frame.scroll.y > before)
         self.send("mousemove", *place)
         self.until(lambda app: imgui.get_current_context().hovered_id == wanted)
         return place
 
-    def _place_of(self, widget: int) -> tuple[int, int] | None:
+    def _place_of(self, widget):
         """The middle of the ImGui item of this id, around which ImGui draws a frame when asked; None where it is not to
         be seen.
         """
@@ -173,13 +171,13 @@ class Driver:
         top, bottom = (pick(corner.y for corner in corners) for pick in (min, max))
         return round((left + right) / 2), round((top + bottom) / 2)
 
-    def press(self, widget: str, window: str = "panel") -> None:
+    def press(self, widget, window="panel"):
         """Click a widget."""
         self.find(widget, window)
         self.send("click", 1)
         self.app.step()
 
-    def slide(self, widget: str, share: float) -> None:
+    def slide(self, widget, share):
         """Drag a slider of the panel to this share of its width."""
         from imgui_bundle import imgui
 
@@ -194,27 +192,23 @@ class Driver:
         self.send("mouseup", 1)
         self.until_idle()
 
-    def type(self, text: str) -> None:
+    def type(self, text):
         """Type into the field that has the keyboard, in place of what it holds."""
         self.send("key", "ctrl+a")
         self.send("type", "--delay", 20, text)
         self.until_idle()
 
-    def close(self) -> None:
+    def close(self):
         """Close the window, as leaving the program does."""
         self.app.close()
 
-    def image(self) -> np.ndarray:
+    def image(self):
         """The picture as it was drawn last."""
         return self.app.scene_view.renderer.read_image()
 
 
-Opener = Callable[..., Driver]
-"""What `open_window` gives: a photo's path, or None, where preferences are kept, and what a `Source` takes."""
-
-
 @pytest.fixture
-def no_egl_context() -> Iterator[None]:
+def no_egl_context():
     """Puts an EGL context of other tests aside: a window's GLX context cannot be current beside it."""
     try:
         egl = ctypes.CDLL("libEGL.so.1")
@@ -234,14 +228,16 @@ def no_egl_context() -> Iterator[None]:
 
 
 @pytest.fixture
-def wide_window(monkeypatch: pytest.MonkeyPatch) -> None:
+def wide_window(monkeypatch):
     """Windows open with room beside the panel."""
     monkeypatch.setattr("tests.viewer.conftest.SMALL_WINDOW", WIDE_WINDOW)
 
 
 @pytest.fixture
-def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
-    """Opens the viewer on a photo, with the panel and the sections that are used most; closes it after the test."""
+def open_window(display, no_egl_context):
+    """Opens the viewer on a photo's path, or None; kept_in: where preferences are kept; changes: of the `Source`. The
+    sections that are used most are open; the window closes after the test.
+    """
     from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.model.state.app_state import AppState
@@ -250,8 +246,8 @@ def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
     apps = []
     sections = with_sections((), "view", "focus", "aperture", "light")
 
-    def start(path: Path | None, kept_in: Path | None = None, **changes: object) -> Driver:
-        state = initial_state(Source(str(path), **changes)) if path else None  # type: ignore[arg-type]
+    def start(path, kept_in=None, **changes):
+        state = initial_state(Source(str(path), **changes)) if path else None
         preferences = Preferences(window=SMALL_WINDOW, open_sections=sections)
         apps.append(App(replace(state or AppState(), preferences=preferences, hides_panel=False), kept_in))
         return Driver(apps[-1])

@@ -1,7 +1,5 @@
 """Copying and pasting with the system's clipboard, in a real window."""
 
-from __future__ import annotations
-
 import subprocess
 from io import BytesIO
 from pathlib import Path
@@ -11,7 +9,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.types import GridShape, InputError
-from tests.viewer.conftest import Opener, write_scene
+from tests.viewer.conftest import write_scene
 from viewer.app.clipboard import MAX_PASTED, paste_picture
 from viewer.model import lens
 from viewer.model.action import do
@@ -19,36 +17,34 @@ from viewer.model.action import do
 CLIPBOARD = ["xclip", "-selection", "clipboard"]
 
 
-def a_picture() -> bytes:
+def a_picture():
     """A PNG file."""
     data = BytesIO()
     Image.fromarray(np.random.default_rng(0).integers(0, 256, (30, 40, 3), np.uint8)).save(data, "PNG")
     return data.getvalue()
 
 
-def put(data: bytes, kind: str = "UTF8_STRING") -> None:
+def put(data, kind="UTF8_STRING"):
     """Into the clipboard, by another program."""
     quiet = subprocess.DEVNULL
     subprocess.run([*CLIPBOARD, "-t", kind, "-i"], input=data, stdout=quiet, stderr=quiet, check=True)
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00\xff\xfe" * 9, a_picture()[:-40]])
-def test_damaged_pictures_are_one_line(display: str, data: bytes) -> None:
+def test_damaged_pictures_are_one_line(display, data):
     put(data, "image/png")
     with pytest.raises(InputError, match="neither a picture"):
         paste_picture("/no/such/file")
 
 
-def test_old_pasted_pictures_go(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_pasted_pictures_go(display, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     put(a_picture(), "image/png")
     pasted = [paste_picture("") for _ in range(MAX_PASTED + 2)]
     assert [Path(path).exists() for path in pasted] == [False] * 2 + [True] * MAX_PASTED
 
 
-def test_pictures_and_paths_are_copied_and_pasted(
-    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pictures_and_paths_are_copied_and_pasted(open_window, photo_path, tmp_path, monkeypatch):
     """What is pasted at once waits until it is copied; words change nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     viewer = open_window(photo_path, grid=GridShape(3, 3))
@@ -62,7 +58,6 @@ def test_pictures_and_paths_are_copied_and_pasted(
     data = subprocess.run([*CLIPBOARD, "-t", "image/png", "-o"], capture_output=True, check=True).stdout
     copied = np.asarray(Image.open(BytesIO(data)).convert("RGB"))
     assert copied.shape == (64, 96, 3)
-    assert viewer.app.state.source is not None
     with Image.open(viewer.app.state.source.path) as pasted:
         assert np.array_equal(np.asarray(pasted.convert("RGB")), copied)
     viewer.until_idle()
@@ -70,8 +65,7 @@ def test_pictures_and_paths_are_copied_and_pasted(
         path = write_scene(tmp_path, name, seed=1)
         put(form.format(path).encode())
         viewer.send("key", "ctrl+v")
-        viewer.until(lambda app, path=path: app.state.source.path == str(path))  # type: ignore[misc]
-        viewer.until_idle()
+        viewer.settle(lambda app, path=path: app.state.source.path == str(path))
     put(b"some words")
     before = viewer.app.state.source
     viewer.send("key", "ctrl+v")

@@ -1,64 +1,40 @@
 """Depth edited in a real window: the brush, the sliders and handles, undo, saving and opening maps, what is told."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import FAR, NEAR, Driver, Opener
-from viewer.app.main_loop import App
+from iibr_core.types import ViewOffset
+from tests.viewer.conftest import FAR, NEAR
 from viewer.model import depth, gesture, lens, messages, saving
 from viewer.model.action import do
 from viewer.model.state.depth import Brush
-from viewer.model.state.preferences import SECTIONS, with_sections
+from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
-GRID = GridShape(3, 3)
+OPEN_SECTIONS = ("depth",)
 
 
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Iterator[Driver]:
-    driver = open_window(photo_path, grid=GRID)
-    driver.until_idle()
-    preferences = replace(driver.app.state.preferences, open_sections=with_sections((), "depth"))
-    driver.app.state = replace(driver.app.state, preferences=preferences)
-    driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.until_idle()
-    yield driver
-    driver.send("mouseup", 1)
-
-
-def disparity_of(app: App) -> np.ndarray:
+def disparity_of(app):
     """What the views on the screen were made from, as given."""
-    assert app.scene_view.loaded is not None
     return app.scene_view.loaded.disparity.values
 
 
-def is_made(app: App) -> bool:
+def is_made(app):
     """Whether the screen shows what was asked for last."""
     return app.scene_view.generation == app.state.generation
 
 
-def settle(viewer: Driver, condition: Callable[[App], bool]) -> None:
-    """Draw until a condition is true and nothing is left to do."""
-    viewer.until(condition)
-    viewer.until_idle()
-
-
-def until_made(viewer: Driver, generation: int) -> None:
+def until_made(viewer, generation):
     """Draw until the screen shows this generation of the scene."""
-    settle(viewer, lambda app: app.state.generation == generation and is_made(app))
+    viewer.settle(lambda app: app.state.generation == generation and is_made(app))
 
 
-def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
+def press_at(viewer, x_share, y_share):
     """Put the pointer there and hold it down."""
     x, y = viewer.position(x_share, y_share)
     viewer.send("mousemove", x, y)
@@ -67,7 +43,7 @@ def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
     viewer.until(lambda app: app.state.stroke is not None)
 
 
-def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver) -> None:
+def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer):
     viewer.app.do(
         do(lens.move_eye, ViewOffset(0.0, 1.0)), do(depth.set_brush, Brush(radius=0.1, strength=1.0, is_on=True))
     )
@@ -77,7 +53,7 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.stroke is None)
     viewer.send("mouseup", 1)
-    settle(viewer, is_made)
+    viewer.settle(is_made)
     np.testing.assert_array_equal(disparity_of(viewer.app), given, "Escape takes a stroke back")
     assert len(viewer.app.state.history.past) == 1
     generation = viewer.app.state.generation
@@ -106,7 +82,7 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     assert not viewer.app.state.should_quit
 
 
-def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_elsewhere(viewer: Driver) -> None:
+def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_elsewhere(viewer):
     given = disparity_of(viewer.app).copy()
     viewer.app.do(do(depth.set_brush, Brush(radius=0.15)))
     viewer.press("Bucket")
@@ -127,7 +103,7 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
     assert is_far[given == NEAR].mean() > 0.7
 
 
-def test_a_section_that_is_opened_at_the_bottom_comes_into_sight(viewer: Driver) -> None:
+def test_a_section_that_is_opened_at_the_bottom_comes_into_sight(viewer):
     sections = tuple(section for section in SECTIONS if section != "depth")
     viewer.app.state = replace(
         viewer.app.state, preferences=replace(viewer.app.state.preferences, open_sections=sections)
@@ -141,13 +117,12 @@ def test_a_section_that_is_opened_at_the_bottom_comes_into_sight(viewer: Driver)
         _, y = viewer.find("###section Depth")
     before = panel.scroll.y
     viewer.send("click", 1)
-    viewer.until(lambda app: "depth" in app.state.preferences.open_sections)
-    viewer.until_idle()
+    viewer.settle(lambda app: "depth" in app.state.preferences.open_sections)
     assert panel.scroll.y > before
     assert viewer.find("###section Depth")[1] < y
 
 
-def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer: Driver) -> None:
+def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer):
     """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
     sections = tuple(section for section in SECTIONS if section != "depth")
     preferences = replace(viewer.app.state.preferences, open_sections=sections)
@@ -157,18 +132,18 @@ def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(view
     panel = imgui.internal.find_window_by_name("panel")
     assert panel.scroll.y == 0
     viewer.send("key", "b")
-    settle(viewer, lambda app: app.state.brush.is_on)
+    viewer.settle(lambda app: app.state.brush.is_on)
     assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
     assert panel.scroll.y > 0
     viewer.press("Smooth")
-    settle(viewer, lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
+    viewer.settle(lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
     viewer.slide("##Size", 0.9)
     assert viewer.app.state.brush.radius > 0.1
     viewer.send("key", "b")
     viewer.until(lambda app: not app.state.brush.is_on)
 
 
-def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver) -> None:
+def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer):
     viewer.slide("##Far clip", 0.2)
     until_made(viewer, 2)
     assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
@@ -191,32 +166,29 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     assert len(viewer.app.state.history.past) == 3
 
 
-def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:
+def test_a_map_is_saved_and_opened_again_by_its_path(viewer, photo_path, tmp_path):
     viewer.press("Invert")
     until_made(viewer, 2)
     wanted = disparity_of(viewer.app).copy()
     viewer.app.do(do(saving.ask_to_save, "map"))
-    settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
+    viewer.settle(lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "turned.npy"
     viewer.type(str(out))
     viewer.send("key", "Return")
-    settle(viewer, lambda app: out.exists())
+    viewer.settle(lambda app: out.exists())
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
-    viewer.app.do(do(messages.show_prompt, PathPrompt("map")))
-    viewer.until_idle()
+    viewer.do(do(messages.show_prompt, PathPrompt("map")))
     viewer.type(str(out))
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
-    settle(viewer, is_made)
+    viewer.settle(is_made)
     assert viewer.app.state.depth.edits == DepthEdits()
     np.testing.assert_array_equal(disparity_of(viewer.app), wanted)
-    assert viewer.app.state.scene is not None
-    assert viewer.app.state.scene.depth_origin is not None
     assert "turned.npy" in viewer.app.state.scene.depth_origin.line
 
 
-def test_edits_need_no_photo_and_survive_a_bad_map(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:
+def test_edits_need_no_photo_and_survive_a_bad_map(viewer, photo_path, tmp_path):
     photo_path.unlink()
     viewer.press("Refine edges")
     until_made(viewer, 2)
@@ -227,19 +199,18 @@ def test_edits_need_no_photo_and_survive_a_bad_map(viewer: Driver, photo_path: P
     bad.write_bytes(b"no map")
     viewer.app.window.on_drop(None, [str(bad)])
     viewer.until(lambda app: bool(app.state.notices))
-    settle(viewer, is_made)
+    viewer.settle(is_made)
     assert viewer.app.state.notices[-1].is_error
     assert viewer.app.state.depth.edits.is_inverted
     assert disparity_of(viewer.app)[0, 0] == NEAR
 
 
-def test_a_click_selects_a_surface_to_move_it_and_to_keep_it_sharp(viewer: Driver) -> None:
+def test_a_click_selects_a_surface_to_move_it_and_to_keep_it_sharp(viewer):
     app = viewer.app
     app.do(do(depth.set_brush, Brush("select", is_on=True)))
     viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", 1)
-    settle(viewer, lambda app: app.state.selection is not None and app.state.selection.range_px is not None)
+    viewer.settle(lambda app: app.state.selection is not None and app.state.selection.range_px is not None)
     near = app.scene_view.pick(ViewOffset(0, 0), 48, 32)
-    assert app.state.selection is not None
     assert app.state.selection.range_px == (pytest.approx(near, abs=0.05), pytest.approx(near, abs=0.05))
     overlay = app.inspection_view.draw(app.state, app.layout()).overlay
     assert overlay is not None
@@ -250,7 +221,7 @@ def test_a_click_selects_a_surface_to_move_it_and_to_keep_it_sharp(viewer: Drive
     moved = disparity_of(app) - before
     assert moved[32, 48] == pytest.approx(-0.1 * (NEAR - FAR), abs=0.01)
     assert moved[4, 4] == 0, "the wall stays"
-    viewer.until(lambda app: app.state.selection is not None and app.state.selection.range_px[1] < near - 0.05)  # type: ignore[index]
+    viewer.until(lambda app: app.state.selection is not None and app.state.selection.range_px[1] < near - 0.05)
     viewer.press("Keep sharp")
     viewer.until(lambda app: app.state.optics.aperture_diameter > 0)
     assert app.state.optics.focus_disparity == pytest.approx(app.scene_view.pick(ViewOffset(0, 0), 48, 32), abs=0.05)

@@ -1,29 +1,24 @@
 """The system's file dialogs: what they are asked to show. They themselves wait for a person."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from imgui_bundle import portable_file_dialogs
 
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.app.dialogs import ask_for_path, ask_for_place, list_folder
-from viewer.model.state.prompts import ChoiceOf, ExportPrompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, SavePrompt
 
 PLACE = SavePrompt("photos/one-iibr.png", ScreenSize(3, 2))
 
 
 @pytest.mark.parametrize("beside", ["photos/one.jpg", "photos/", "~/photos/"])
 @pytest.mark.parametrize(("what", "kind"), [("photo", "open_file"), ("folder", "select_folder")])
-def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(
-    monkeypatch: pytest.MonkeyPatch, what: ChoiceOf, kind: str, beside: str
-) -> None:
+def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(monkeypatch, what, kind, beside):
     monkeypatch.setenv("HOME", os.getcwd())
-    asked: list[tuple[object, ...]] = []
+    asked = []
     monkeypatch.setattr(portable_file_dialogs, kind, lambda *words: asked.append(words))
     ask_for_path(what, beside)
     _, start, *filters = asked[0]
@@ -32,8 +27,8 @@ def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(
         assert {"*.jpg", "*.JPG", "*.HEIC", "*.hif"} <= set(patterns[1].split())
 
 
-def test_a_place_is_asked_for_with_the_typed_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[object, ...]] = []
+def test_a_place_is_asked_for_with_the_typed_name(monkeypatch):
+    asked = []
     monkeypatch.setattr(portable_file_dialogs, "save_file", lambda *words: asked.append(words))
     monkeypatch.setattr(portable_file_dialogs, "select_folder", lambda *words: asked.append(words))
     ask_for_place(PLACE)
@@ -42,7 +37,7 @@ def test_a_place_is_asked_for_with_the_typed_name(monkeypatch: pytest.MonkeyPatc
     assert asked[1][1] == os.path.join(os.getcwd(), "photos")
 
 
-def test_a_folder_shows_what_can_be_opened_in_natural_order(tmp_path: Path) -> None:
+def test_a_folder_shows_what_can_be_opened_in_natural_order(tmp_path):
     for name in ("IMG_10.jpg", "IMG_9.JPG", "IMG_9_depth.png", ".hidden.jpg", "notes.txt", "net.onnx"):
         (tmp_path / name).touch()
     for name in ("b", "A", ".git"):
@@ -55,7 +50,7 @@ def test_a_folder_shows_what_can_be_opened_in_natural_order(tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems show their dialog without a program")
-def test_an_open_dialog_ends_with_the_program(tmp_path: Path) -> None:
+def test_an_open_dialog_ends_with_the_program(tmp_path):
     """The dialog's program waits for a person, longer than the test may take."""
     program, started = tmp_path / "zenity", tmp_path / "started"
     program.write_text(f"#!/bin/sh\ntouch {started}\nexec sleep 600\n")

@@ -1,7 +1,5 @@
 """What files dropped on the window ask for."""
 
-from __future__ import annotations
-
 import pytest
 
 from iibr_core.depth.choice import DepthChoice
@@ -27,7 +25,7 @@ STATE = AppState(source=SCENE.source, scene=SCENE)
         (["dog_depth.JPG"], "photo.png", "dog_depth.JPG"),
     ],
 )
-def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
+def test_dropped_files(paths, opened, disparity):
     (action,) = actions_from_drop(paths, STATE)
     choice = DepthChoice(file=disparity, stretches=disparity is not None)
     assert action == do(opening.open_source, Source(opened, choice, max_pixels=7))

@@ -1,10 +1,7 @@
 """A folder of photos in a real window: keys and clicks go on, neighbours are read ahead, small pictures appear."""
 
-from __future__ import annotations
-
 import os
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,40 +10,37 @@ from PIL import ImageGrab
 from iibr_core.scenes.scene import Source, WantedPhoto
 from iibr_core.types import GridShape
 from tests.iibr_core.scenes.test_opening import write_large_photo
-from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.app.main_loop import App
+from tests.viewer.conftest import write_scene
 from viewer.model import folder
 from viewer.model.action import do
 
 
 @pytest.fixture
-def viewer(open_window: Opener, tmp_path: Path) -> Driver:
+def viewer(open_window, tmp_path):
     for i in range(3):
         write_scene(tmp_path, f"photo{i}", seed=i)
     driver = open_window(tmp_path, grid=GridShape(3, 3))
-    driver.until(lambda app: app.state.folder is not None)
-    driver.until_idle()
+    driver.settle(lambda app: app.state.folder is not None)
     return driver
 
 
-def bad_tile(app: App) -> np.ndarray | None:
+def bad_tile(app):
     """The middle tile of three, as it is on the screen; None without filmstrip."""
     strip = app.layout().filmstrip
     if strip is None:
         return None
-    left, middle, width = app.window.place[0], strip.x + strip.width / 2, strip.height  # type: ignore[index]
-    top = app.window.place[1] + strip.y  # type: ignore[index]
+    left, middle, width = app.window.place[0], strip.x + strip.width / 2, strip.height
+    top = app.window.place[1] + strip.y
     screen = ImageGrab.grab(xdisplay=os.environ["DISPLAY"])
     box = left + middle - width / 2, top + 8, left + middle + width / 2, top + strip.height - 8
-    return np.asarray(screen.crop(tuple(map(round, box))))  # type: ignore[arg-type]
+    return np.asarray(screen.crop(tuple(map(round, box))))
 
 
-def shows(driver: Driver, name: str) -> None:
-    driver.until(lambda app: app.state.scene is not None and app.state.scene.name == name)
-    driver.until_idle()
+def shows(driver, name):
+    driver.settle(lambda app: app.state.scene is not None and app.state.scene.name == name)
 
 
-def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Driver, tmp_path: Path) -> None:
+def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer, tmp_path):
     next_photo = WantedPhoto(Source(str(tmp_path / "photo1.png"), grid=GridShape(3, 3)), 1.0)
     viewer.until(lambda app: app.scene_loader.ahead.get(next_photo) is not None)
     (tmp_path / "photo1.png").write_bytes(b"no photo any more")  # so that what is shown now was read before
@@ -56,10 +50,10 @@ def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Drive
     shows(viewer, "photo0")
     viewer.send("key", "Page_Up")
     viewer.until_idle()
-    assert viewer.app.state.scene.name == "photo0"  # type: ignore[union-attr]
+    assert viewer.app.state.scene.name == "photo0"
 
 
-def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_window: Opener, tmp_path: Path) -> None:
+def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_window, tmp_path):
     paths = [write_large_photo(tmp_path, f"photo{i}") for i in range(3)]
     driver = open_window(tmp_path, grid=GridShape(3, 3))
     driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
@@ -72,21 +66,18 @@ def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_windo
     driver.app.do(do(folder.step, 2))
     driver.app.step()
     scene, drawn = driver.app.state.scene, driver.app.scene_view.picture_drawn
-    assert scene is not None
     assert (scene.name, scene.is_sketch) == ("photo2", True)
-    assert drawn is not None
     assert drawn.generation == driver.app.state.generation
 
 
-def test_a_photo_that_cannot_be_read_has_its_name_in_the_filmstrip(open_window: Opener, tmp_path: Path) -> None:
+def test_a_photo_that_cannot_be_read_has_its_name_in_the_filmstrip(open_window, tmp_path):
     write_scene(tmp_path, "photo0")
     write_scene(tmp_path, "photo2")
     bad = tmp_path / "photo1.jpg"
     bad.write_bytes(b"no photo")
     driver = open_window(tmp_path, grid=GridShape(3, 3))
     driver.until(lambda app: bad_tile(app) is not None)
-    driver.until(lambda app: app._filmstrip.thumbnails((str(bad),)) == {str(bad): None})
-    driver.until_idle()
+    driver.settle(lambda app: app._filmstrip.thumbnails((str(bad),)) == {str(bad): None})
     assert (bad_tile(driver.app).max(axis=2) > 150).sum() > 20  # letters
     driver.send("key", "Page_Down")
     driver.until(lambda app: any("photo1.jpg" in notice.text for notice in app.state.notices))
@@ -94,7 +85,7 @@ def test_a_photo_that_cannot_be_read_has_its_name_in_the_filmstrip(open_window: 
     shows(driver, "photo2")
 
 
-def test_one_goes_on_from_a_folder_whose_first_photo_cannot_be_read(open_window: Opener, tmp_path: Path) -> None:
+def test_one_goes_on_from_a_folder_whose_first_photo_cannot_be_read(open_window, tmp_path):
     (tmp_path / "photo0.jpg").write_bytes(b"no photo")
     write_scene(tmp_path, "photo1")
     driver = open_window(tmp_path, grid=GridShape(3, 3))
@@ -105,7 +96,7 @@ def test_one_goes_on_from_a_folder_whose_first_photo_cannot_be_read(open_window:
 
 
 @pytest.mark.usefixtures("wide_window")
-def test_the_filmstrip_shows_all_photos_and_opens_one(viewer: Driver, tmp_path: Path) -> None:
+def test_the_filmstrip_shows_all_photos_and_opens_one(viewer, tmp_path):
     paths = tuple(str(tmp_path / f"photo{i}.png") for i in range(3))
     viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
     shows(viewer, "photo0")
@@ -117,7 +108,7 @@ def test_the_filmstrip_shows_all_photos_and_opens_one(viewer: Driver, tmp_path: 
     assert viewer.app.state.generation == generation, "a click on the open photo changes nothing"
 
 
-def test_no_thread_is_left_when_the_window_closes(viewer: Driver) -> None:
+def test_no_thread_is_left_when_the_window_closes(viewer):
 
     viewer.send("key", "Page_Down")
     viewer.app.step()

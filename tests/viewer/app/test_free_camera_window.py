@@ -1,17 +1,12 @@
 """A camera that leaves the plane of the views, in a real window, by real key events."""
 
-from __future__ import annotations
-
 import threading
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.scenes.screen_size import ScreenSize
-from tests.viewer.conftest import Driver
 from viewer.app import saving
 from viewer.model import lens
 from viewer.model.action import ask, do
@@ -21,7 +16,7 @@ from viewer.model.state.viewpoint import FreeCamera
 from viewer.ui.overlays.chips import CHIP
 
 
-def seen(viewer: Driver) -> np.ndarray:
+def seen(viewer):
     """What the free camera sees, once that is shown."""
     viewer.until(
         lambda app: (
@@ -32,13 +27,13 @@ def seen(viewer: Driver) -> np.ndarray:
     return viewer.image().astype(int)
 
 
-def red_places(pixels: np.ndarray) -> np.ndarray:
+def red_places(pixels):
     """(N, 2): x and y of the near square, as shares of the picture."""
     y, x = np.nonzero(pixels[..., 0] > pixels[..., 1] + 60)
     return np.stack([x / pixels.shape[1], y / pixels.shape[0]], axis=-1)
 
 
-def test_the_camera_steps_forward_looks_aside_and_goes_back(viewer: Driver) -> None:
+def test_the_camera_steps_forward_looks_aside_and_goes_back(viewer):
     before = viewer.image()
     viewer.send("key", "w", "key", "w")
     viewer.until(lambda app: app.state.free_camera == FreeCamera(forward=0.1))
@@ -47,20 +42,17 @@ def test_the_camera_steps_forward_looks_aside_and_goes_back(viewer: Driver) -> N
     viewer.until(lambda app: app.state.free_camera == FreeCamera(right=0.1))
     assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.45, abs=0.02)
     viewer.press("###leave", CHIP)
-    viewer.until(lambda app: app.state.free_camera is None and app.free_camera_view.shown is None)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.free_camera is None and app.free_camera_view.shown is None)
     assert viewer.app.state.optics.focus_disparity == 0, "nothing behind the chip was clicked"
     np.testing.assert_array_equal(viewer.image(), before)
 
 
-def test_pictures_that_wait_show_what_the_camera_saw(
-    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pictures_that_wait_show_what_the_camera_saw(viewer, tmp_path, monkeypatch):
     """Each of its own camera, however far that has moved when its turn comes."""
     app, paths = viewer.app, [tmp_path / f"{k}.png" for k in range(2)]
     held, export = threading.Event(), saving.export_picture
 
-    def export_when_held(*arguments: Any) -> Path:
+    def export_when_held(*arguments):
         assert held.wait(60)
         return export(*arguments)
 
@@ -74,7 +66,7 @@ def test_pictures_that_wait_show_what_the_camera_saw(
     for path in paths:
         viewer.send("key", "w")
         before = app.state.free_camera
-        viewer.until(lambda app, before=before: app.state.free_camera != before)  # type: ignore[misc]
+        viewer.until(lambda app, before=before: app.state.free_camera != before)
         expected.append(seen(viewer))
         app.do(do(ask, SaveTask(SavePrompt(str(path), ScreenSize(expected[-1].shape[1], expected[-1].shape[0])))))
         viewer.until(lambda app: not app.state.tasks)

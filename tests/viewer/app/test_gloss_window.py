@@ -1,44 +1,24 @@
 """Gloss in a real window: switched on, the light dragged, painted with the brush, and what each edit costs."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from iibr_core.gloss.settings import Gloss
-from iibr_core.types import GridShape
-from tests.viewer.conftest import Driver, Opener
-from viewer.model.state.preferences import with_sections
+OPEN_SECTIONS = ("gloss",)
 
 
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
-    preferences = replace(driver.app.state.preferences, open_sections=with_sections((), "gloss"))
-    driver.app.state = replace(driver.app.state, preferences=preferences)
-    driver.until_idle()
-    return driver
-
-
-def shown_gloss(driver: Driver) -> Gloss:
+def shown_gloss(driver):
     gloss = driver.app.state.optics.gloss
-    assert gloss is not None
     return gloss
 
 
-def make_glossy(driver: Driver) -> None:
+def make_glossy(driver):
     """Switch gloss on, and wait until it is seen: what it means is found out beside the window."""
     driver.press("Glossy surface")
     driver.until(lambda app: app.state.optics.gloss is not None)
-    driver.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
-    driver.until_idle()
+    driver.settle(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
 
 
-def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer: Driver) -> None:
+def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer):
     plain = viewer.image()
     make_glossy(viewer)
     shiny = viewer.image()
@@ -48,19 +28,18 @@ def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer: 
     viewer.send("mousemove", x, y, "mousedown", 1)
     viewer.app.step()
     viewer.send("mousemove", x + 300, y)
-    viewer.until(lambda app: app.state.optics.gloss.light.direction[0] > 0.9)  # type: ignore[union-attr]
+    viewer.until(lambda app: app.state.optics.gloss.light.direction[0] > 0.9)
     viewer.send("mouseup", 1)
     viewer.until_idle()
     assert not np.array_equal(viewer.image(), shiny)
     assert viewer.app.gloss_finder.asked is request, "the light needs no new maps"
     viewer.send("key", "ctrl+z")
     viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.optics.gloss is None)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.optics.gloss is None)
     assert np.array_equal(viewer.image(), plain)
 
 
-def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) -> None:
+def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer):
     make_glossy(viewer)
     viewer.press("Only brush strokes")
     viewer.press("Mark")
@@ -69,7 +48,7 @@ def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) 
     viewer.send("mousemove", *viewer.position(0.3, 0.5), "mousedown", 1)
     viewer.app.step()
     viewer.send("mousemove", *viewer.position(0.6, 0.5))
-    viewer.until(lambda app: len(app.state.optics.gloss.surface.strokes[-1:]) == 1)  # type: ignore[union-attr]
+    viewer.until(lambda app: len(app.state.optics.gloss.surface.strokes[-1:]) == 1)
     viewer.send("mouseup", 1)
     viewer.until_idle()
     (stroke,) = shown_gloss(viewer).surface.strokes

@@ -1,9 +1,6 @@
 """Ctrl-C and SIGTERM while the window is open."""
 
-from __future__ import annotations
-
 import signal
-from pathlib import Path
 
 import glfw
 import pytest
@@ -14,11 +11,11 @@ from viewer.model.action import do
 from viewer.model.state.app_state import AppState
 
 
-def interrupt_when_resized(state: AppState) -> AppState:
+def interrupt_when_resized(state):
     """Have GLFW call what sends the signal; the window closes anyway."""
     window = glfw.get_current_context()
 
-    def on_size(*_: object) -> None:
+    def on_size(*_):
         glfw.set_window_should_close(window, True)
         signal.raise_signal(signal.SIGINT)
 
@@ -27,17 +24,17 @@ def interrupt_when_resized(state: AppState) -> AppState:
     return state
 
 
-def test_a_signal_during_a_callback_is_not_lost(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_during_a_callback_is_not_lost(display, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(KeyboardInterrupt):
         run(AppState(), None, do(interrupt_when_resized))
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_the_second_signal_is_not_waited_for() -> None:
+def test_the_second_signal_is_not_waited_for():
     turns = 0
 
-    def interrupt_each_turn() -> None:
+    def interrupt_each_turn():
         nonlocal turns
         with interruptions():
             while True:

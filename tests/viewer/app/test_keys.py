@@ -1,7 +1,5 @@
 """What the keys ask for."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 
@@ -13,7 +11,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from viewer.app.keys import Keys, actions_from_keys, read_keys
 from viewer.model import history, inspection, lens, messages, saving, window
-from viewer.model.action import Action, do
+from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import PalettePrompt
@@ -22,7 +20,7 @@ SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9,
 STATE = AppState(source=SCENE.source, scene=SCENE)
 
 
-def test_keys() -> None:
+def test_keys():
     assert actions_from_keys(Keys(), STATE) == []
     reset = "Reset viewpoint, focus and aperture"
     assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [
@@ -44,11 +42,11 @@ def test_keys() -> None:
         ((do(inspection.show_views, True), do(inspection.compare, "photo")), do(inspection.show_views, False)),
     ],
 )
-def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], closes: Action) -> None:
+def test_escape_closes_what_lies_over_the_picture(opens, closes):
     assert actions_from_keys(Keys(is_escape=True), functools.reduce(reduce, opens, STATE)) == [closes]
 
 
-def test_what_is_typed_too_early_is_no_command() -> None:
+def test_what_is_typed_too_early_is_no_command():
     """The palette comes up, and has the keyboard a frame later."""
     keys = Keys(arrows=ViewOffset(1, 0), commands=("Take a snapshot", "Save the picture…"))
     assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [do(saving.ask_to_save)]
@@ -56,7 +54,7 @@ def test_what_is_typed_too_early_is_no_command() -> None:
     assert move == do(lens.move_eye, ViewOffset(0.5, 0))
 
 
-def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
+def test_what_is_switched_is_not_switched_back_while_its_key_is_held():
     repeating = {command.name for command in COMMANDS if command.repeats}
     for name in ("Undo", "Redo", "Larger text", "Smaller text", "Step forward", "Next photo of the folder"):
         assert name in repeating
@@ -64,7 +62,7 @@ def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
         assert name not in repeating
 
 
-def test_a_key_counts_with_the_modifiers_it_was_pressed_with(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_key_counts_with_the_modifiers_it_was_pressed_with(monkeypatch):
     """In a long frame Ctrl is up again before ImGui handles the key."""
     monkeypatch.setattr(imgui, "is_key_pressed", lambda key, repeats=True: key == imgui.Key.p)
     context = imgui.create_context()

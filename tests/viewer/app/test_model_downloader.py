@@ -1,10 +1,6 @@
 """One click from a guess to better depth, in a real window: a hub on this machine stands in for the network."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -17,9 +13,7 @@ from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.depth.onnx_graphs import published, weighing
-from tests.local_hub import Hub, local_hub
-from tests.viewer.conftest import Driver, Opener
-from viewer.app.main_loop import App
+from tests.local_hub import local_hub
 from viewer.background.depth_models import OFFLINE, list_models
 from viewer.model import depth, depth_models, gesture, history, lens, opening, preferences
 from viewer.model.action import do
@@ -32,7 +26,7 @@ GRID = GridShape(3, 3)
 GET, ESTIMATE = "Get better depth", "Estimate depth"
 
 
-def write_photo(path: Path, seed: int = 0) -> Path:
+def write_photo(path, seed=0):
     """A light square before a dark wall, the square in the upper half, where a guess by height has it far away."""
     pixels = np.full((64, 96, 3), 60, np.uint8)
     pixels[8:28, 36:66] = 220
@@ -42,7 +36,7 @@ def write_photo(path: Path, seed: int = 0) -> Path:
 
 
 @pytest.fixture
-def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
+def hub(tmp_path, monkeypatch):
     with local_hub(MODEL.commit, published(tmp_path / "network")) as server:
         server.may_finish.clear()
         # read once, at import: HF_ENDPOINT and HF_HOME come too late here
@@ -55,7 +49,7 @@ def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
 
 
 @pytest.fixture
-def downloaded(hub: Hub) -> Hub:
+def downloaded(hub):
     """The model is here already."""
     hub.may_finish.set()
     fetch(MODEL)
@@ -64,54 +58,49 @@ def downloaded(hub: Hub) -> Hub:
 
 
 @pytest.fixture
-def viewer(hub: Hub, open_window: Opener, tmp_path: Path) -> Driver:
+def viewer(hub, open_window, tmp_path):
     """A photo without depth, and what to do about that."""
     return with_offer(open_window(write_photo(tmp_path / "photo.png"), grid=GRID))
 
 
-def with_offer(driver: Driver) -> Driver:
-    driver.until(lambda app: offered_model(app.state) is not None)
-    driver.until_idle()
+def with_offer(driver):
+    driver.settle(lambda app: offered_model(app.state) is not None)
     return driver
 
 
-def is_deep(app: App) -> bool:
+def is_deep(app):
     scene = app.state.scene
     origin = scene.depth_origin if scene is not None and scene.source is app.state.source else None
     return origin is not None and origin.kind == "model"
 
 
-def depth_kind(app: App) -> str | None:
+def depth_kind(app):
     scene = app.state.scene
     return scene.depth_origin.kind if scene is not None and scene.depth_origin is not None else None
 
 
-def wall_slope(viewer: Driver) -> float:
+def wall_slope(viewer):
     """How much nearer the wall is below than above, px a view."""
     above, below = (viewer.app.scene_view.pick(ViewOffset(0, 0), 90, y) for y in (3, 58))
-    assert above is not None
-    assert below is not None
     return below - above
 
 
-def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, hub: Hub) -> None:
+def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer, hub):
     assert depth_kind(viewer.app) == "rough"
     assert not hub.asked, "nothing is fetched unasked"
-    at = place_of(50, 20, viewer.app.state.scene)  # type: ignore[arg-type]
+    at = place_of(50, 20, viewer.app.state.scene)
     before = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
     viewer.app.do(do(lens.move_eye, ViewOffset(0.5, -0.5)), do(gesture.end_gesture))
     viewer.app.do(do(lens.focus_on, at, before or 0.0), do(lens.set_aperture, 1.0))
     viewer.app.do(do(depth.set_brush, Brush(radius=0.1, strength=1.0)), do(depth.paint, (0.1, 0.9)))
-    viewer.app.do(do(gesture.end_gesture))
-    viewer.until_idle()
+    viewer.do(do(gesture.end_gesture))
     edits = viewer.app.state.depth.edits
     assert wall_slope(viewer) > 0.5, "a guess has what is low near"
     viewer.press(GET, "notices")
     viewer.until(lambda app: app.state.models.downloading is not None)
     assert viewer.app.state.prompt is None, "the click was the consent"
     hub.may_finish.set()
-    viewer.until(is_deep)
-    viewer.until_idle()
+    viewer.settle(is_deep)
     state = viewer.app.state
     assert model_here(MODEL) is not None
     assert wall_slope(viewer) < 0.05, "all of the wall is as dark, and so as far away"
@@ -120,14 +109,13 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
     assert state.optics.eye == ViewOffset(0.5, -0.5)
     assert state.optics.aperture_diameter == pytest.approx(1.0, rel=0.2), "discs stay as wide as they were"
     assert sharp_disparity(state.optics, at) == pytest.approx(square, abs=0.02), "what was sharp is sharp"
-    assert state.depth.edits == edits == viewer.app.scene_view.loaded.depth_settings.edits  # type: ignore[union-attr]
+    assert state.depth.edits == edits == viewer.app.scene_view.loaded.depth_settings.edits
     assert offered_model(state) is None
-    viewer.app.do(do(history.undo), do(history.undo))
-    viewer.until_idle()
+    viewer.do(do(history.undo), do(history.undo))
     assert is_deep(viewer.app), "the estimate is no edit"
 
 
-def test_a_download_is_cancelled_fails_and_is_tried_again_by_one_click_each(viewer: Driver, hub: Hub) -> None:
+def test_a_download_is_cancelled_fails_and_is_tried_again_by_one_click_each(viewer, hub):
     before, model = viewer.app.state.source, hub.files["onnx/model.onnx"]
     viewer.press(GET, "notices")
     viewer.until(lambda app: app.state.models.downloading is not None)
@@ -146,7 +134,7 @@ def test_a_download_is_cancelled_fails_and_is_tried_again_by_one_click_each(view
     viewer.until(is_deep)
 
 
-def test_without_a_connection_a_download_says_so_with_details(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_connection_a_download_says_so_with_details(viewer, monkeypatch):
     nowhere = "http://127.0.0.1:9"
     monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", nowhere)
     template = f"{nowhere}/{{repo_id}}/resolve/{{revision}}/{{filename}}"
@@ -158,18 +146,15 @@ def test_without_a_connection_a_download_says_so_with_details(viewer: Driver, mo
     assert viewer.app.state.models.downloading is None
 
 
-def test_a_model_that_is_here_is_used_unasked_unless_that_is_switched_off(
-    downloaded: Hub, open_window: Opener, tmp_path: Path
-) -> None:
+def test_a_model_that_is_here_is_used_unasked_unless_that_is_switched_off(downloaded, open_window, tmp_path):
     driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
-    driver.until(is_deep)
-    driver.until_idle()
+    driver.settle(is_deep)
     assert offered_model(driver.app.state) is None
     source = source_beside(driver.app.state.source, str(write_photo(tmp_path / "other.png", seed=9)))
-    seen: list[str | None] = []
+    seen = []
     driver.app.do(do(opening.open_source, source))
 
-    def is_next_deep(app: App) -> bool:
+    def is_next_deep(app):
         is_open = app.state.scene is not None and app.state.scene.source is source
         seen.extend([depth_kind(app)] if is_open else [])
         return is_open and is_deep(app)
@@ -186,14 +171,13 @@ def test_a_model_that_is_here_is_used_unasked_unless_that_is_switched_off(
     driver.until(is_deep)
 
 
-def open_another(driver: Driver, path: Path) -> None:
+def open_another(driver, path):
     """Open a photo by its name, and wait until it is all there."""
     driver.app.do(do(opening.open_source, Source(str(path), grid=GRID)))
-    driver.until(lambda app: app.state.scene is not None and app.state.scene.source.path == str(path))
-    driver.until_idle()
+    driver.settle(lambda app: app.state.scene is not None and app.state.scene.source.path == str(path))
 
 
-def test_a_model_is_offered_once_in_a_run_and_comes_back_by_the_badge(viewer: Driver, tmp_path: Path) -> None:
+def test_a_model_is_offered_once_in_a_run_and_comes_back_by_the_badge(viewer, tmp_path):
     open_another(viewer, write_photo(tmp_path / "other.png", seed=9))
     assert offered_model(viewer.app.state) is None
     viewer.press("Depth guessed", "Depth guessed")
@@ -207,15 +191,12 @@ def test_a_model_is_offered_once_in_a_run_and_comes_back_by_the_badge(viewer: Dr
     assert offered_model(viewer.app.state) is None
     viewer.press("Depth guessed", "Depth guessed")
     viewer.until(lambda app: offered_model(app.state) is not None)
-    viewer.app.do(do(preferences.set_font_scale, 2.3))
-    viewer.until_idle()
+    viewer.do(do(preferences.set_font_scale, 2.3))
     viewer.find(GET, "notices")
 
 
-def test_a_running_estimate_is_given_up_by_one_click(
-    downloaded: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def wait_to_be_stopped(source: Source, loaded: object, refine: float) -> None:
+def test_a_running_estimate_is_given_up_by_one_click(downloaded, open_window, tmp_path, monkeypatch):
+    def wait_to_be_stopped(source, loaded, refine):
         while not is_stopped():
             is_running.set()
         raise Cancelled
@@ -235,48 +216,39 @@ def test_a_running_estimate_is_given_up_by_one_click(
     viewer.until(is_deep)
 
 
-def test_a_model_file_of_ones_own_is_used_in_place_and_a_broken_one_leaves_the_depth(
-    viewer: Driver, tmp_path: Path
-) -> None:
+def test_a_model_file_of_ones_own_is_used_in_place_and_a_broken_one_leaves_the_depth(viewer, tmp_path):
     (tmp_path / "broken.onnx").write_bytes(b"no model")
     viewer.app.do(do(depth_models.use_model, str(tmp_path / "broken.onnx")))
-    viewer.until(lambda app: any(notice.is_error for notice in app.state.notices))
-    viewer.until_idle()
+    viewer.settle(lambda app: any(notice.is_error for notice in app.state.notices))
     assert depth_kind(viewer.app) == "rough"
     file = weighing(tmp_path / "own.onnx", (1, 1, 1))
     viewer.app.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(gesture.end_gesture))
     viewer.app.do(do(depth_models.use_model, str(file)))
     viewer.until(is_deep)
     assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.5)
-    assert viewer.app.state.source is not None
     assert viewer.app.state.source.depth.model == str(file)
     assert not viewer.app.state.notices, "what failed before is no news"
     for name, seed in (("second.png", 9), ("third.png", 99)):
         open_another(viewer, write_photo(tmp_path / name, seed=seed))
         viewer.until(is_deep)
-        assert viewer.app.state.scene is not None
         assert viewer.app.state.scene.depth_model == str(file)
 
 
-def test_a_copied_model_is_listed_and_used_for_photos_without_depth(
-    hub: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_copied_model_is_listed_and_used_for_photos_without_depth(hub, open_window, tmp_path, monkeypatch):
     """As after `iibr models get FILE.onnx`."""
     monkeypatch.setattr("iibr_core.depth.models.catalog.own_models_folder", lambda: tmp_path / "copied")
     register(weighing(tmp_path / "mine.onnx", (1, 1, 1)))
     driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
     driver.until(is_deep)
-    assert driver.app.state.scene is not None
     assert driver.app.state.scene.depth_model == "mine"
-    driver.app.do(do(depth_models.show_models))
-    driver.until_idle()
+    driver.do(do(depth_models.show_models))
     assert any(model.name == "mine" and model.is_ready for model in driver.app.state.models.known)
 
 
 @pytest.mark.parametrize("is_lost", [False, True])
 def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
-    hub: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_lost: bool
-) -> None:
+    hub, open_window, tmp_path, monkeypatch, is_lost
+):
     """If the model's file is gone, the message says so, and the place in focus stays sharp."""
     monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
     photo, kept = write_photo(tmp_path / "photo.png"), tmp_path / "kept"
@@ -285,10 +257,9 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     first.app.do(do(depth_models.use_model, str(file)))
     first.until(is_deep)
     first.until(lambda app: bool(list((kept / "sessions").glob("*.json"))))
-    at = place_of(50, 20, first.app.state.scene)  # type: ignore[arg-type]
+    at = place_of(50, 20, first.app.state.scene)
     sharp = first.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
-    first.app.do(do(lens.focus_on, at, sharp or 0.0), do(gesture.end_gesture))
-    first.until_idle()
+    first.do(do(lens.focus_on, at, sharp or 0.0), do(gesture.end_gesture))
     left = first.app.state.optics
     first.app.do(do(depth_models.use_model, MODEL.name))  # chosen for all photos, but it never comes
     first.app.close()
@@ -300,8 +271,7 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     (notice,) = second.app.state.notices
     assert ("own.onnx" in notice.text) == is_lost
     if not is_lost:
-        second.until(is_deep)
-        second.until_idle()
+        second.settle(is_deep)
         assert second.app.state.optics == left
         return
     second.until(lambda app: app.state.chosen_focus is not None)
@@ -310,26 +280,7 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     assert sharp_disparity(second.app.state.optics, at) == pytest.approx(now, abs=0.02)
 
 
-def test_a_photo_opens_with_the_focus_that_it_was_left_with(
-    downloaded: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
-    photo, kept = write_photo(tmp_path / "photo.png"), tmp_path / "kept"
-    first = open_window(photo, kept_in=kept, grid=GRID)
-    first.until(is_deep)
-    first.until_idle()
-    assert not list((kept / "sessions").glob("*.json")), "the user did nothing yet"
-    first.app.do(do(lens.move_eye, ViewOffset(0.5, 0.0)), do(lens.set_focus, 0.25), do(gesture.end_gesture))
-    first.until_idle()
-    left = first.app.state.optics
-    first.app.close()
-    second = open_window(photo, kept_in=kept, grid=GRID)
-    second.until(is_deep)
-    second.until_idle()
-    assert second.app.state.optics == left
-
-
-def test_a_missing_package_completes_the_sentence_about_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_completes_the_sentence_about_a_model(monkeypatch):
     """The window writes "It ..." before it."""
     monkeypatch.setattr("iibr_core.depth.models.known.is_installed", lambda name: False)
     assert all(offer.lacks.startswith("needs the package ") for offer in list_models())

@@ -1,10 +1,7 @@
 """The next photo in a real window looks and behaves as if it were the first one: nothing of the photo before stays."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +11,9 @@ from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener, write_scene
+from tests.viewer.conftest import write_scene
 from viewer.model import depth, gesture, inspection, lens, opening, selection, viewpoint
-from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
+from viewer.model.action import do
 from viewer.model.state.depth import DepthSample
 from viewer.model.state.viewpoint import Zoom
 
@@ -33,7 +29,7 @@ SAMPLING_LEVELS = 24
 """Largest difference of two pictures through an open lens at rest, of 255; parts of another photo differ by 50."""
 
 
-def of_the_photo(state: AppState) -> dict[str, object]:
+def of_the_photo(state):
     """Return all that a photo has in the state."""
     found = {field.name: getattr(state, field.name) for field in fields(state) if field.name not in OF_THE_PROGRAM}
     look = state.inspection
@@ -45,12 +41,11 @@ def of_the_photo(state: AppState) -> dict[str, object]:
     }
 
 
-def everything(driver: Driver) -> None:
+def everything(driver):
     """Change all that can be changed of the open photo, and look at it in every way."""
 
-    def change(*actions: Action) -> None:
-        driver.app.do(*actions)
-        driver.until_idle()
+    def change(*actions):
+        driver.do(*actions)
 
     change(do(depth.set_tone, replace(UNEDITED, gamma=1.5), is_finished=True))
     brush = replace(driver.app.state.brush, is_on=True, radius=0.2)
@@ -66,16 +61,16 @@ def everything(driver: Driver) -> None:
     change(do(inspection.compare, None), do(inspection.set_overlay, None))
 
 
-def leave_picture(driver: Driver) -> None:
+def leave_picture(driver):
     """Move the pointer to where it points at nothing."""
     driver.send("mousemove", 3, 3)
     driver.until(lambda app: app.state.hover is None)
 
 
-def seen(driver: Driver) -> list[np.ndarray]:
+def seen(driver):
     """Return the window's picture at rest, from a corner, with each map, with an open lens and with gloss."""
     app, pictures = driver.app, []
-    looks: tuple[tuple[Action, ...], ...] = (
+    looks = (
         (), (do(lens.move_eye, ViewOffset(1.0, 1.0)),),
         (do(inspection.set_overlay, "inpainted"),), (do(inspection.set_overlay, "disparity"),),
         (do(inspection.set_overlay, None), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.3)),
@@ -84,18 +79,15 @@ def seen(driver: Driver) -> list[np.ndarray]:
     for actions in looks:
         app.do(*actions)
         leave_picture(driver)
-        driver.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
-        driver.until_idle()
+        driver.settle(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
         place, frame = app.window.place, app.layout().frame
-        assert place is not None
-        assert frame is not None
         left, top = place[0] + frame.x, place[1] + frame.y
         box = left + 8, top + 40, left + frame.width - 8, top + frame.height - 40
         pictures.append(np.asarray(ImageGrab.grab(xdisplay=os.environ["DISPLAY"]).convert("RGB").crop(box)).astype(int))
     return pictures
 
 
-def next_photo(folder: Path) -> Path:
+def next_photo(folder):
     """Write a mirrored photo of another scene: everything lies elsewhere."""
     path = write_scene(folder, "next", seed=3)
     Image.open(path).transpose(Image.Transpose.ROTATE_180).save(path)
@@ -105,7 +97,7 @@ def next_photo(folder: Path) -> Path:
 
 
 @pytest.mark.usefixtures("wide_window")
-def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window: Opener, tmp_path: Path) -> None:
+def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window, tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     after, first = next_photo(tmp_path / "b"), write_scene(tmp_path / "a")
@@ -115,8 +107,7 @@ def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window: Opener, tm
     before = of_the_photo(driver.app.state)
     leave_picture(driver)
     driver.app.do(do(opening.open_source, Source(str(after), grid=GRID)))
-    driver.until(lambda app: app.state.scene is not None and app.state.scene.name == "next")
-    driver.until_idle()
+    driver.settle(lambda app: app.state.scene is not None and app.state.scene.name == "next")
     state, pictures = of_the_photo(driver.app.state), seen(driver)
     driver.close()
     fresh = open_window(after, grid=GRID)

@@ -1,8 +1,5 @@
 """Pictures on disk: larger than the graphics card draws at once, with more than 8 bits where the file holds them."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,12 +22,12 @@ from viewer.model import lens
 from viewer.model.action import do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import Saved, SavePrompt
+from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
 
 
 @pytest.fixture(scope="module")
-def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def photo(tmp_path_factory):
     from iibr_core.formats.images.write import write_image
 
     folder = tmp_path_factory.mktemp("saving")
@@ -42,20 +39,20 @@ def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def opened(photo: Path) -> Iterator[OffscreenScene]:
+def opened(photo):
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(photo), grid=GridShape(3, 3)))
         viewer.do(do(lens.move_eye, ViewOffset(0.3, -0.4)), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.2))
         yield viewer
 
 
-def saved(viewer: OffscreenScene, path: Path, size_px: tuple[int, int]) -> np.ndarray:
+def saved(viewer, path, size_px):
     shot = shot_of(viewer.state, size_px, PictureFormat())
     export_picture(path, viewer.picture(size_px, is_float(path), shot.color_space), shot)
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[..., :3]
 
 
-def test_exr_holds_light_finer_than_png(opened: OffscreenScene, tmp_path: Path) -> None:
+def test_exr_holds_light_finer_than_png(opened, tmp_path):
     png = saved(opened, tmp_path / "a.png", (WIDTH, HEIGHT)) * 255
     light = saved(opened, tmp_path / "a.exr", (WIDTH, HEIGHT))
     assert oiio.ImageBuf(str(tmp_path / "a.exr")).spec().format == oiio.FLOAT
@@ -65,16 +62,14 @@ def test_exr_holds_light_finer_than_png(opened: OffscreenScene, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", [f"a{ending}" for ending in KINDS])
-def test_settings_are_inside(opened: OffscreenScene, tmp_path: Path, name: str) -> None:
+def test_settings_are_inside(opened, tmp_path, name):
     saved(opened, tmp_path / name, (70, 50))
     settings = read_settings(tmp_path / name)
     assert settings.optics == opened.state.optics
     assert settings.size_px == (70, 50)
 
 
-def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
-    opened: OffscreenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(opened, tmp_path, monkeypatch):
     large = 4 * WIDTH, 4 * HEIGHT
     at_once = saved(opened, tmp_path / "once.png", large) * 255
     monkeypatch.setattr(opened.gl, "max_texture_size", 192)
@@ -84,12 +79,12 @@ def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
 
 
 @pytest.mark.parametrize("what", ["picture", "map"])
-def test_a_place_is_checked_before_anything_is_drawn(tmp_path: Path, what: Saved) -> None:
+def test_a_place_is_checked_before_anything_is_drawn(tmp_path, what):
     photo, taken = write_scene(tmp_path), tmp_path / "taken.png"
     taken.write_bytes(b"mine")
     (tmp_path / "link.png").symlink_to(photo)
 
-    def place(name: str, may_replace: bool = False) -> Path:
+    def place(name, may_replace=False):
         prompt = SavePrompt(f" {tmp_path / name} " if name else "", ScreenSize(8, 8), what=what)
         return checked_path(SaveTask(prompt, may_replace), (photo,))
 
@@ -104,12 +99,12 @@ def test_a_place_is_checked_before_anything_is_drawn(tmp_path: Path, what: Saved
 
 
 @pytest.mark.parametrize("size", [ScreenSize(0, 5), ScreenSize(5, -1), ScreenSize(16384, 16384)])
-def test_absurd_sizes_are_refused(tmp_path: Path, size: ScreenSize) -> None:
+def test_absurd_sizes_are_refused(tmp_path, size):
     with pytest.raises(InputError, match="1 to 100 million"):
         checked_path(SaveTask(SavePrompt(str(tmp_path / "a.png"), size)), ())
 
 
-def test_the_inputs_of_a_scene_are_its_files(tmp_path: Path) -> None:
+def test_the_inputs_of_a_scene_are_its_files(tmp_path):
     """The open scene with the map that was found, and what is being opened; models by name are no files."""
     scene = Scene(Source("open.png"), "open", 9, 6, GridShape(1, 1), (0.0, 1.0), "map")
     scene = replace(scene, depth_origin=DepthOrigin("file", "map", file="open_disparity.npy"))

@@ -1,7 +1,5 @@
 """Preferences and recent files on disk: round trip, damage, and places where nothing can be written."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +24,7 @@ from viewer.model.state.preferences import Preferences
 from viewer.model.tracking import HEAD_RANGE_LIMITS
 
 
-def test_kept_values_come_back(tmp_path: Path) -> None:
+def test_kept_values_come_back(tmp_path):
     state = AppState(recent=("/photos/ä.png", "b.png"))
     for action in (
         do(preferences.set_theme, "light"),
@@ -49,7 +47,7 @@ def test_kept_values_come_back(tmp_path: Path) -> None:
     assert load_preferences(AppState(), tmp_path) == AppState(), "nothing is kept there"
 
 
-def test_the_last_file_is_known_as_long_as_it_exists(tmp_path: Path) -> None:
+def test_the_last_file_is_known_as_long_as_it_exists(tmp_path):
     photo = tmp_path / "photo.png"
     photo.touch()
     assert last_opened(tmp_path) is None, "nothing is kept"
@@ -60,7 +58,7 @@ def test_the_last_file_is_known_as_long_as_it_exists(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [b"", b"{", b"\xff\xfe\x00", b"[" * 50_000, b'"text"', b'{"theme": "purple"}'])
-def test_damaged_files_give_a_notice_each_and_the_usual_values(tmp_path: Path, damage: bytes) -> None:
+def test_damaged_files_give_a_notice_each_and_the_usual_values(tmp_path, damage):
     (tmp_path / PREFERENCES_FILE).write_bytes(damage)
     (tmp_path / RECENT_FILE).write_bytes(damage)
     state = load_preferences(AppState(), tmp_path)
@@ -70,7 +68,7 @@ def test_damaged_files_give_a_notice_each_and_the_usual_values(tmp_path: Path, d
     assert RECENT_FILE in state.notices[1].text
 
 
-def test_values_of_other_versions_are_left_out_and_too_large_ones_limited(tmp_path: Path) -> None:
+def test_values_of_other_versions_are_left_out_and_too_large_ones_limited(tmp_path):
     kept = {
         "theme": "light",
         "font_scale": 1e9,
@@ -85,14 +83,14 @@ def test_values_of_other_versions_are_left_out_and_too_large_ones_limited(tmp_pa
     assert state.notices == ()
 
 
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="file") as error:
         store_preferences(AppState(), tmp_path / "file" / "folder")
     assert "\n" not in str(error.value)
 
 
-def test_who_has_no_home_folder_is_not_asked_to_choose_another(tmp_path: Path) -> None:
+def test_who_has_no_home_folder_is_not_asked_to_choose_another(tmp_path):
     (tmp_path / "file").touch()
     keeper = PreferencesKeeper(AppState(), tmp_path / "file" / "folder")
     (notice,) = reduce(AppState(), keeper.keep(AppState(), is_closing=True)[0]).notices

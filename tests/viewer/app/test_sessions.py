@@ -1,11 +1,8 @@
 """Photos open as they were left, in a real window, after the program was killed too."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from dataclasses import replace
-from pathlib import Path
 from threading import Event, current_thread, main_thread
 
 import numpy as np
@@ -18,7 +15,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import DEADLINE_S, Driver, Opener, rests
+from tests.viewer.conftest import DEADLINE_S, rests
 from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
@@ -30,11 +27,11 @@ RESTORED = "as you left it"
 
 
 @pytest.fixture(autouse=True)
-def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
+def _soon(monkeypatch):
     monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
 
 
-def change(driver: Driver) -> None:
+def change(driver):
     """Change all that a session keeps."""
     app = driver.app
     driver.until_idle()
@@ -46,26 +43,28 @@ def change(driver: Driver) -> None:
     driver.until_idle()
 
 
-def left_with(driver: Driver) -> tuple[object, ...]:
+def left_with(driver):
     state = driver.app.state
     return state.optics, state.depth, state.depth_strength
 
 
-def is_restored(driver: Driver) -> bool:
+def is_restored(driver):
     return any(RESTORED in notice.text.lower() for notice in driver.app.state.notices)
 
 
-def sessions_in(kept: Path) -> list[Path]:
+def sessions_in(kept):
     return list((kept / "sessions").glob("*.json"))
 
 
-def write_session(kept: Path, photo_path: Path, text: str) -> None:
+def write_session(kept, photo_path, text):
     (kept / "sessions").mkdir(parents=True)
     (kept / "sessions" / f"{key_of(Source(str(photo_path), grid=ONE))}.json").write_text(text, "utf-8")
 
 
-def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window, photo_path, tmp_path):
     first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    first.until_idle()
+    assert not sessions_in(tmp_path / "kept"), "the user did nothing yet"
     change(first)
     first.until(lambda app: bool(sessions_in(tmp_path / "kept")) and rests(app))
     unfinished = shutil.ignore_patterns(".*")
@@ -73,22 +72,18 @@ def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window: Opener, pho
     left = left_with(first)
     first.app.close()
     second = open_window(photo_path, kept_in=tmp_path / "of the dead", grid=ONE)
-    second.until(lambda app: is_restored(second))
-    second.until_idle()
+    second.settle(lambda app: is_restored(second))
     assert left_with(second) == left
     assert isinstance(second.app.state.depth.edits.strokes[0], Stroke)
-    assert second.app.scene_view.loaded.depth_settings == second.app.state.depth  # type: ignore[union-attr]
-    second.app.do(do(history.undo))
-    second.until_idle()
+    assert second.app.scene_view.loaded.depth_settings == second.app.state.depth
+    second.do(do(history.undo))
     assert second.app.state.depth.edits == UNEDITED
 
 
-def test_what_is_changed_while_the_session_is_looked_for_is_kept(
-    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_changed_while_the_session_is_looked_for_is_kept(open_window, photo_path, tmp_path, monkeypatch):
     may_look = Event()
 
-    def late_key(source: Source) -> str:
+    def late_key(source):
         may_look.wait(DEADLINE_S)
         return key_of(source)
 
@@ -99,9 +94,7 @@ def test_what_is_changed_while_the_session_is_looked_for_is_kept(
     driver.until(lambda app: bool(sessions_in(tmp_path / "kept")))
 
 
-def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(
-    open_window: Opener, photo_path: Path, tmp_path: Path
-) -> None:
+def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(open_window, photo_path, tmp_path):
     first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     change(first)
     first.until(lambda app: bool(sessions_in(tmp_path / "kept")) and rests(app))
@@ -111,7 +104,6 @@ def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(
     driver = open_window(photo_path, grid=ONE)
     driver.until_idle()
     state, other = driver.app.state, Source(str(tmp_path / "other.png"))
-    assert state.scene is not None
     store = SessionStore(tmp_path / "kept", lambda: None)
     while not store.run(state):
         driver.app.step()
@@ -120,7 +112,7 @@ def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(
     assert session.read_text("utf-8") == kept
 
 
-def test_a_session_belongs_to_a_file_as_it_is_now(photo_path: Path, tmp_path: Path) -> None:
+def test_a_session_belongs_to_a_file_as_it_is_now(photo_path, tmp_path):
     source = Source(str(photo_path))
     key = key_of(source)
     chosen_model = DepthChoice(start="model", model="anything")
@@ -133,7 +125,7 @@ def test_a_session_belongs_to_a_file_as_it_is_now(photo_path: Path, tmp_path: Pa
     assert key_of(Source(str(tmp_path))) == folder
 
 
-def test_a_damaged_session_is_named_and_replaced(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+def test_a_damaged_session_is_named_and_replaced(open_window, photo_path, tmp_path):
     text = "[" * 100_000
     write_session(tmp_path / "kept", photo_path, text)
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
@@ -142,13 +134,11 @@ def test_a_damaged_session_is_named_and_replaced(open_window: Opener, photo_path
     driver.until(lambda app: sessions_in(tmp_path / "kept")[0].read_text() != text)
 
 
-def test_many_strokes_are_painted_beside_the_window(
-    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_many_strokes_are_painted_beside_the_window(open_window, photo_path, tmp_path, monkeypatch):
     """The drawing thread paints only what is new: otherwise it would stand still for a minute."""
     paint, painted_here = DepthCanvas._paint, []
 
-    def watched(canvas: DepthCanvas, stroke: Stroke) -> None:
+    def watched(canvas, stroke):
         painted_here.extend([stroke] if current_thread() is main_thread() else [])
         paint(canvas, stroke)
 
@@ -157,24 +147,21 @@ def test_many_strokes_are_painted_beside_the_window(
     settings = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(96, 64), DepthEdits(strokes=strokes))
     write_session(tmp_path / "kept", photo_path, settings_text(settings))
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-    driver.until(lambda app: is_restored(driver) and app.state.shown_generation == app.state.generation)
-    driver.until_idle()
+    driver.settle(lambda app: is_restored(driver) and app.state.shown_generation == app.state.generation)
     assert painted_here == []
     app = driver.app
     app.do(do(depth.set_brush, replace(app.state.brush, is_on=True)), do(depth.paint, (0.5, 0.5)))
     driver.until(lambda app: len(painted_here) > 0)
     app.do(do(gesture.end_gesture))
-    driver.until(lambda app: app.state.shown_generation == app.state.generation)
-    driver.until_idle()
+    driver.settle(lambda app: app.state.shown_generation == app.state.generation)
     assert len({stroke.points[0] for stroke in painted_here}) == 1
     loaded = app.scene_view.loaded
-    assert loaded is not None
     assert len(loaded.depth_settings.edits.strokes) == 41
     wanted = apply_edits(loaded.photo.pixels, loaded.refined.values, loaded.depth_settings.edits)
     assert np.array_equal(loaded.disparity.values, wanted)
 
 
-def test_of_too_many_sessions_the_oldest_go(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+def test_of_too_many_sessions_the_oldest_go(open_window, photo_path, tmp_path):
     folder = tmp_path / "kept" / "sessions"
     folder.mkdir(parents=True)
     for number in range(MAX_SESSIONS + 2):
@@ -190,9 +177,7 @@ def test_of_too_many_sessions_the_oldest_go(open_window: Opener, photo_path: Pat
     assert f"{key_of(Source(str(photo_path), grid=ONE))}.json" in kept
 
 
-def test_a_folder_that_cannot_be_written_gives_one_notice(
-    open_window: Opener, photo_path: Path, tmp_path: Path
-) -> None:
+def test_a_folder_that_cannot_be_written_gives_one_notice(open_window, photo_path, tmp_path):
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     driver.until_idle()
     (tmp_path / "kept" / "sessions").write_text("a file is in the way")

@@ -1,14 +1,10 @@
 """The stereo picture on a second monitor and in the window itself, read back from the screen."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,43 +19,40 @@ from iibr_core.formats.lenticular import Calibration
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.fake_bridge import PORTRAIT, fake_bridge
-from tests.viewer.conftest import Driver, Opener
+from tests.viewer.conftest import Driver
 from tests.xvfb import display_with_monitors
 from viewer import entry
-from viewer.app.main_loop import App
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, messages, preferences, stereo
 from viewer.model.action import ask, do
 from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES, Monitor, StereoMode
+from viewer.model.state.stereo import STEREO_MODES, Monitor
 from viewer.model.state.tasks import PlainTask
 
 FIRST, SECOND = ScreenSize(1024, 768), ScreenSize(640, 480)
 CALIBRATION = {"pitch": 50, "slope": -7, "center": 0.2, "DPI": 300, "screenW": SECOND.width, "screenH": SECOND.height}
 Pixels = NDArray[np.uint8]
-Eyes = Callable[[ScreenSize, float], tuple[Pixels, Pixels]]
 
 
 @pytest.fixture(scope="module")
-def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def display(tmp_path_factory):
     """A server with two monitors."""
     with display_with_monitors(tmp_path_factory.mktemp("x"), FIRST, SECOND) as name:
         yield name
 
 
 @contextmanager
-def eyes_of(viewer: Driver) -> Iterator[Eyes]:
+def eyes_of(viewer):
     """Draws the pictures of both eyes without a window, in rooms of a size and displayed aspect; the window is closed
     first, as its context cannot be current beside another.
     """
     state = viewer.app.state
-    assert state.source is not None
     viewer.close()
     with OffscreenScene("egl") as scene:
         opened = scene.open(state.source)
 
-        def draw(frame: ScreenSize, aspect: float) -> tuple[Pixels, Pixels]:
+        def draw(frame, aspect):
             pair = stereo.eyes_at(opened, state.optics, state.stereo)
             size = size_in_frame(opened, frame, pair[0].part, aspect)
             left, right = (scene.draw(RenderSettings(eye.optics, size, eye.part)) for eye in pair)
@@ -68,12 +61,12 @@ def eyes_of(viewer: Driver) -> Iterator[Eyes]:
         yield draw
 
 
-def grabbed(display: str, left: int, size: ScreenSize) -> Pixels:
+def grabbed(display, left, size):
     """The screen from a column on."""
     return np.asarray(ImageGrab.grab((left, 0, left + size.width, size.height), xdisplay=display))[..., :3]
 
 
-def woven(mode: StereoMode, draw: Eyes, size: ScreenSize) -> Pixels:
+def woven(mode, draw, size):
     """The two pictures as a display of this kind expects them."""
     (width, height), aspect = size, size.width / size.height
     if mode == "top-bottom":
@@ -89,18 +82,16 @@ def woven(mode: StereoMode, draw: Eyes, size: ScreenSize) -> Pixels:
     return np.where(is_right[..., None], right, left)
 
 
-def test_all_arrangements_reach_the_second_monitor(viewer: Driver, display: str) -> None:
+def test_all_arrangements_reach_the_second_monitor(viewer, display):
     viewer.app.do(do(stereo.show, True), do(stereo.set_screen, 0.5), do(lens.move_eye, ViewOffset(0.4, 0)))
     viewer.app.do(do(stereo.set_eyes, 1.5))
     shown = {}
     for mode in STEREO_MODES:
-        viewer.app.do(do(stereo.set_mode, mode))
-        viewer.until_idle()
+        viewer.do(do(stereo.set_mode, mode))
         shown[mode] = grabbed(display, FIRST.width, SECOND)
     viewer.app.do(do(stereo.set_mode, "columns"))
     viewer.send("key", "l")
-    viewer.until(lambda app: app.state.preferences.swaps_eyes)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.preferences.swaps_eyes)
     swapped = grabbed(display, FIRST.width, SECOND)
     with eyes_of(viewer) as eyes:
         for mode, pixels in shown.items():
@@ -111,9 +102,8 @@ def test_all_arrangements_reach_the_second_monitor(viewer: Driver, display: str)
     assert psnr(swapped[:, ::2], right[:, ::2]) >= 45
 
 
-def test_mouse_and_keys_on_the_second_monitor_count(viewer: Driver) -> None:
-    viewer.app.do(do(stereo.show, True), do(stereo.set_mode, "half-sbs"))
-    viewer.until_idle()
+def test_mouse_and_keys_on_the_second_monitor_count(viewer):
+    viewer.do(do(stereo.show, True), do(stereo.set_mode, "half-sbs"))
     viewer.send("mousemove", FIRST.width + 480, 240)
     viewer.until(lambda app: app.state.hover is not None and abs(app.state.hover.x_px - 48) < 2)
     viewer.send("mousedown", 1)
@@ -124,41 +114,34 @@ def test_mouse_and_keys_on_the_second_monitor_count(viewer: Driver) -> None:
     viewer.until_idle()
     focus = viewer.app.state.optics.focus_disparity
     viewer.send("click", 4)
-    viewer.until(lambda app: app.state.optics.focus_disparity > focus)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.optics.focus_disparity > focus)
     picture = viewer.app.stereo_screen.view.drawn
-    assert picture is not None
     assert picture.weave.eyes[0].optics.focus_disparity == viewer.app.state.optics.focus_disparity
     viewer.send("key", "Tab")
     viewer.until(lambda app: app.state.is_panel_hidden)
     viewer.send("key", "Escape")
-    viewer.until(lambda app: not app.state.stereo.is_shown)
-    viewer.until_idle()
+    viewer.settle(lambda app: not app.state.stereo.is_shown)
     assert viewer.app.stereo_screen.second is None
 
 
-def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(viewer: Driver, display: str) -> None:
+def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(viewer, display):
     place = viewer.app.window.place
     viewer.send("key", "3")
-    viewer.until(lambda app: app.stereo_screen.second is not None)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.stereo_screen.second is not None)
     subprocess.run(["xrandr", "--output", "DUMMY1", "--off"], check=True)
     try:
         viewer.until(lambda app: not app.state.stereo.is_shown)
         assert "DUMMY1" in viewer.app.state.notices[-1].text
         viewer.send("mousemove", 100, 300, "key", "3")
         viewer.until(lambda app: app.state.stereo.is_shown and app.window.is_fullscreen)
-        viewer.app.do(do(stereo.set_mode, "anaglyph"), do(messages.dismiss))
-        viewer.until_idle()
+        viewer.do(do(stereo.set_mode, "anaglyph"), do(messages.dismiss))
         assert viewer.app.state.is_panel_hidden
         alone = grabbed(display, 0, FIRST)
         viewer.send("key", "Tab")
-        viewer.until(lambda app: not app.state.is_panel_hidden)
-        viewer.until_idle()
+        viewer.settle(lambda app: not app.state.is_panel_hidden)
         under_panel = grabbed(display, 0, FIRST)
         viewer.send("key", "Escape")
-        viewer.until(lambda app: not app.state.stereo.is_shown and not app.window.is_fullscreen)
-        viewer.until_idle()
+        viewer.settle(lambda app: not app.state.stereo.is_shown and not app.window.is_fullscreen)
         assert viewer.app.window.place == place
     finally:
         subprocess.run(["xrandr", "--output", "DUMMY1", "--mode", "640x480", "--pos", f"{FIRST.width}x0"], check=True)
@@ -168,11 +151,10 @@ def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(vi
     assert psnr(under_panel[:, :700], wanted[:, :700]) >= 45, "the panel lies over the picture"
 
 
-def test_monitor_and_arrangement_are_remembered(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+def test_monitor_and_arrangement_are_remembered(open_window, photo_path, tmp_path):
     first = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
     first.until(lambda app: app.state.scene is not None)
     wanted = first.app.state.monitors[1]
-    assert wanted is not None
     assert replace(wanted, width_mm=0) == Monitor("DUMMY1", FIRST.width, 0, *SECOND)
     first.app.do(do(stereo.choose_monitor, wanted), do(stereo.set_mode, "rows"), do(stereo.swap_eyes))
     first.app.step()
@@ -182,58 +164,39 @@ def test_monitor_and_arrangement_are_remembered(open_window: Opener, photo_path:
     second = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
     second.app.do(do(stereo.show, True))
     second.until(lambda app: app.stereo_screen.second is not None)
-    assert second.app.stereo_screen.second is not None
     assert second.app.stereo_screen.second.monitor == wanted
 
 
-def test_the_section_shows_it_and_sets_depth(viewer: Driver) -> None:
-    viewer.app.do(do(preferences.toggle_section, "stereo display"))
-    viewer.press("###show stereo")
-    viewer.until(lambda app: app.stereo_screen.second is not None)
-    viewer.slide("##Eye distance", 0.95)
-    viewer.slide("##Screen plane", 0.05)
-    state = viewer.app.state
-    assert state.scene is not None
-    assert state.stereo.eyes is not None
-    assert state.stereo.eyes > 1.5
-    assert state.stereo.screen > 0.8 * state.scene.disparity_range_px[1], "near is at the left, as for the focus"
-    assert "behind the screen" in stereo.warning(state.scene, state.stereo)
-    picture = viewer.app.stereo_screen.view.drawn
-    assert picture is not None
-    assert picture.weave == stereo.weave_of(state, state.scene, SECOND)
+HEAD = "--tracker", "udp:45454", "--depth-strength", "0.5"
 
 
 @pytest.mark.usefixtures("display", "no_egl_context")
 @pytest.mark.parametrize("words", [("--stereo", "columns"), ("--calibration", "visual.json")])
-def test_the_command_line_begins_with_it(
-    photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, str]
-) -> None:
+def test_the_command_line_begins_with_it(photo_path, tmp_path, monkeypatch, words):
     shown = []
     (tmp_path / "visual.json").write_text(json.dumps(CALIBRATION))
     monkeypatch.chdir(tmp_path)
 
-    def look(app: App, signals: list[int]) -> None:
+    def look(app, signals):
         Driver(app).until(lambda app: app.stereo_screen.view.drawn is not None)
-        shown.append((app.stereo_screen.view.drawn, app.stereo_screen.second))
+        shown.append((app.stereo_screen.view.drawn, app.stereo_screen.second, app.state))
 
     monkeypatch.setattr("viewer.app.main_loop.App.run", look)
     monkeypatch.setattr("viewer.cli.view.user_folder", lambda: tmp_path / "kept")
-    monkeypatch.setattr(sys, "argv", ["iibr", "view", str(photo_path), "--grid", "3", *words])
+    monkeypatch.setattr(sys, "argv", ["iibr", "view", str(photo_path), "--grid", "3", *words, *HEAD])
     assert entry.run() == 0
-    ((picture, second),) = shown
-    assert picture is not None
+    ((picture, second, state),) = shown
     is_lenticular = words[0] == "--calibration"
     mode = "half-sbs" if is_lenticular else "columns"
     assert picture.weave.size_px == SECOND
     assert isinstance(picture.weave.arrangement, Calibration) if is_lenticular else picture.weave.arrangement == mode
     assert len(picture.weave.eyes) == (48 if is_lenticular else 2)
     assert second is not None
+    assert (state.tracking.address, state.depth_strength) == ("udp:45454", 0.5)
     assert load_preferences(AppState(), tmp_path / "kept").preferences.stereo_mode == mode
 
 
-def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
-    viewer: Driver, display: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lenticular_display_that_bridge_knows_gets_its_picture(viewer, display, monkeypatch):
     with fake_bridge(monkeypatch) as bridge:
         place = {"x": FIRST.width, "y": 0}
         bridge.displays = [
@@ -242,19 +205,17 @@ def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
         viewer.app.do(do(preferences.toggle_section, "stereo display"))
         picked = [len(STEREO_MODES)]  # the entry after those for both eyes
 
-        def pick(name: str, *_: object) -> int | None:
+        def pick(name, *_):
             return picked.pop() if name == "Arrangement" and picked else None
 
         monkeypatch.setattr("viewer.ui.sections.stereo_section.combo", pick)
-        viewer.until(lambda app: app.stereo_screen.second is not None)
-        viewer.until_idle()
+        viewer.settle(lambda app: app.stereo_screen.second is not None)
     viewer.app.do(do(lens.move_eye, ViewOffset(0.4, 0)))
     viewer.until(
         lambda app: (each := app.stereo_screen.view.drawn) is not None and each.weave.eyes[0].optics.eye.t == 0.4
     )
     viewer.until_idle()
     shown, state = grabbed(display, FIRST.width, SECOND), viewer.app.state
-    assert state.source is not None
     viewer.close()
     with OffscreenScene("egl") as scene:
         scene.open(state.source)
@@ -264,7 +225,7 @@ def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
     assert (np.abs(shown[..., 1].astype(int) - shown[..., 2]) > 30).any(), "views differ within a pixel of a grey photo"
 
 
-def test_without_bridge_a_notice_says_so(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_bridge_a_notice_says_so(viewer, monkeypatch):
     with fake_bridge(monkeypatch) as bridge:
         bridge.displays = []
         viewer.app.do(do(ask, PlainTask("find display")))

@@ -1,12 +1,9 @@
 """A real window on a private X server, moved by real mouse and key events."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import re
 import subprocess
-from pathlib import Path
 
 import glfw
 import numpy as np
@@ -14,34 +11,23 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import FAR, NEAR, Driver, Opener, write_scene
-from viewer.app.main_loop import App
+from tests.viewer.conftest import FAR, NEAR, write_scene
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model import lens, messages
 from viewer.model.action import do
 
-
-@pytest.fixture
-def viewer(open_window: Opener, photo_path: Path) -> Driver:
-    """The scene open with all its views; the pointer rests in the picture, off the near square."""
-    driver = open_window(photo_path, grid=GridShape(5, 5))
-    driver.until_idle()
-    driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.until_idle()
-    return driver
+GRID = GridShape(5, 5)
 
 
-def shown_focus(viewer: Driver, given: float) -> float:
+def shown_focus(viewer, given):
     """The field disparity of a given one."""
     scene = viewer.app.state.scene
-    assert scene is not None
-    assert scene.plan is not None
     return (given - scene.plan.disparity_zero) * scene.plan.disparity_scale
 
 
-def icon_sizes(driver: Driver) -> list[int]:
+def icon_sizes(driver):
     """Widths of the window's icons: X11 keeps for each its width, its height and its pixels."""
     window = str(glfw.get_x11_window(driver.app.window.handle))
     words = f"xprop -id {window} -notype -len 100000 -f _NET_WM_ICON 32c _NET_WM_ICON".split()
@@ -53,7 +39,7 @@ def icon_sizes(driver: Driver) -> list[int]:
     return sizes
 
 
-def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_path: Path) -> None:
+def test_the_first_picture_comes_before_the_views(open_window, photo_path):
     driver = open_window(photo_path)
     driver.until(lambda app: app.frames_shown > 0)
     assert icon_sizes(driver) == [], "it would delay the picture"
@@ -63,39 +49,35 @@ def test_the_first_picture_comes_before_the_views(open_window: Opener, photo_pat
     assert icon_sizes(driver) == [16, 32, 48]
 
 
-def test_an_empty_window_has_an_icon(open_window: Opener) -> None:
+def test_an_empty_window_has_an_icon(open_window):
     driver = open_window(None)
     driver.until(lambda app: app.frames_shown > 0)
     assert icon_sizes(driver) == [16, 32, 48]
 
 
-def test_views_that_the_graphics_card_cannot_hold_are_an_error(
-    open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_views_that_the_graphics_card_cannot_hold_are_an_error(open_window, photo_path, monkeypatch):
     driver = open_window(photo_path, grid=GridShape(5, 5))
     monkeypatch.setitem(driver.app.scene_view.renderer.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
     driver.until(lambda app: any("use at most 3x3 views" in notice.text for notice in app.state.notices))
     driver.app.do(do(messages.dismiss))
 
 
-def near_centre(image: np.ndarray) -> float:
+def near_centre(image):
     """Column of the near square's middle: nothing else is red."""
     red = image[..., 0].astype(int) - image[..., 1] > 60
     return float(np.nonzero(red)[1].mean())
 
 
-def test_drags_move_the_viewpoint_whole_however_few_frames_they_take(viewer: Driver) -> None:
+def test_drags_move_the_viewpoint_whole_however_few_frames_they_take(viewer):
     app, (x, y), before = viewer.app, viewer.position(0.5, 0.5), viewer.image()
     scene = app.state.scene
-    assert scene is not None
     per_view = units_per_view(app.layout(), scene)
     for moves in (1, 5):
-        words: list[object] = ["mousemove", x, y, "mousedown", 1]
+        words = ["mousemove", x, y, "mousedown", 1]
         for k in range(1, moves + 1):
             words += ["mousemove", x + round(60 * k / moves), y + round(10 * k / moves)]
         viewer.send(*words, "mouseup", 1)
-        viewer.until(lambda app: app.state.optics.eye != CENTRE)
-        viewer.until_idle()
+        viewer.settle(lambda app: app.state.optics.eye != CENTRE)
         assert app.state.optics.eye == pytest.approx(ViewOffset(-10 / per_view, -60 / per_view))
         assert app.state.optics.focus_disparity == 0, "a drag is no click"
         assert near_centre(viewer.image()) > near_centre(before), "near things follow the hand"
@@ -103,13 +85,12 @@ def test_drags_move_the_viewpoint_whole_however_few_frames_they_take(viewer: Dri
         viewer.until_idle()
 
 
-def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer: Driver) -> None:
+def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer):
     pinhole = viewer.image()
     for place, given in (((0.5, 0.5), NEAR), ((0.1, 0.1), FAR)):
         viewer.send("mousemove", *viewer.position(*place), "click", 1)
         wanted = pytest.approx(shown_focus(viewer, given), abs=1e-3)
-        viewer.until(lambda app, wanted=wanted: app.state.optics.focus_disparity == wanted)  # type: ignore[misc]
-        viewer.until_idle()
+        viewer.settle(lambda app, wanted=wanted: app.state.optics.focus_disparity == wanted)
     focus = viewer.app.state.optics.focus_disparity
     assert (viewer.image() != pinhole).any(), "the first click opens the aperture: else nothing would be seen"
     viewer.send("click", 4)
@@ -129,10 +110,9 @@ def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.should_quit)
 
 
-def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_one_edit(viewer: Driver) -> None:
+def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_one_edit(viewer):
     app, before = viewer.app, viewer.image()
-    viewer.until(lambda app: None not in (app.state.facts, app.state.folder) and bool(app.state.models.known))
-    viewer.until_idle()
+    viewer.settle(lambda app: None not in (app.state.facts, app.state.folder) and bool(app.state.models.known))
     shown, drawn = app.frames_shown, app.scene_view.pictures_drawn
     for _ in range(50):
         glfw.post_empty_event()
@@ -152,10 +132,9 @@ def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_on
     assert len(viewer.app.state.history.past) == 1, "a drag is one edit"
 
 
-def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer: Driver, tmp_path: Path) -> None:
+def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer, tmp_path):
     viewer.app.window.on_drop(None, [str(write_scene(tmp_path, "other", seed=1))])
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.scene is not None and app.state.scene.name == "other")
     broken = tmp_path / "broken.png"
     broken.write_bytes(b"this is no picture")
     before = viewer.image()
@@ -164,7 +143,6 @@ def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer: Driver, 
     assert viewer.app.state.notices[0].is_error
     assert "broken.png" in viewer.app.state.notices[0].text
     viewer.until_idle()
-    assert viewer.app.state.scene is not None
     assert viewer.app.state.scene.name == "other"
     np.testing.assert_array_equal(viewer.image(), before)
     # A name that is no text, as GLFW hands it over: its wrapper raises in the midst of the loop.
@@ -174,9 +152,7 @@ def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer: Driver, 
 
 
 @pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [0, 0, 1e308, float("nan")]])
-def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
-    open_window: Opener, tmp_path: Path, kept: list[float]
-) -> None:
+def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(open_window, tmp_path, kept):
     (tmp_path / PREFERENCES_FILE).write_text(json.dumps({"window": kept}))
     window = open_window(None, kept_in=tmp_path).app.window
     _, _, width, height = glfw.get_monitor_workarea(glfw.get_primary_monitor())
@@ -184,16 +160,16 @@ def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
     assert 150 <= window.size.height <= height
 
 
-def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, photo_path: Path) -> None:
+def test_views_come_nearest_first_to_where_the_user_looks(open_window, photo_path):
     """From the hand to the worker: the viewpoint in a corner, the views made again."""
     driver = open_window(photo_path, grid=GridShape(9, 9))
     driver.until_idle()
     before = driver.app.state.scene
     driver.app.do(do(lens.move_eye, ViewOffset(-4.0, -4.0)), do(lens.set_depth_strength, 1.5, is_finished=True))
     driver.until(lambda app: app.state.scene is not before)
-    arrived: list[tuple[int, int]] = []
+    arrived = []
 
-    def is_done(app: App) -> bool:
+    def is_done(app):
         arrived.extend(sorted(app.state.views_there.difference(arrived)))
         return len(arrived) == 81
 

@@ -1,9 +1,6 @@
 """Opening, saving, prompts, keys, preferences and what goes wrong, in a real window."""
 
-from __future__ import annotations
-
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener, rests
+from tests.viewer.conftest import rests
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, opening
@@ -28,13 +25,10 @@ from viewer.model.state.tasks import PlainTask, SaveTask
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 
-def test_a_saved_picture_can_be_taken_again_without_the_window(
-    viewer: Driver, photo_path: Path, tmp_path: Path
-) -> None:
+def test_a_saved_picture_can_be_taken_again_without_the_window(viewer, photo_path, tmp_path):
     viewer.app.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0))
     viewer.send("key", "ctrl+s")
-    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
-    viewer.until_idle()
+    viewer.settle(lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "out.png"
     viewer.type(str(out))
     viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and app.state.prompt.path == str(out))
@@ -52,7 +46,7 @@ def test_a_saved_picture_can_be_taken_again_without_the_window(
     assert difference.max() <= 1 / 255, "another GL context may round differently"
 
 
-def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: Path) -> None:
+def test_a_dropped_saved_picture_offers_its_settings(viewer, tmp_path):
     out = tmp_path / "saved.png"
     viewer.app.do(
         do(lens.move_eye, ViewOffset(1, 1)),
@@ -63,8 +57,7 @@ def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: P
     wanted = viewer.app.state.optics
     np.save(tmp_path / "saved_disparity.npy", np.load(tmp_path / "scene_disparity.npy"))
     viewer.app.window.on_drop(None, [str(out)])
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "saved")
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.scene is not None and app.state.scene.name == "saved")
     assert viewer.app.state.optics == Optics()
     viewer.press("Use its settings", "notices")
     viewer.until(lambda app: app.state.optics == wanted)
@@ -77,18 +70,16 @@ def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: P
     assert [notice.is_error for notice in viewer.app.state.notices if "settings" in notice.text] == [True]
 
 
-def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer: Driver, tmp_path: Path) -> None:
+def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer, tmp_path):
     mask = tmp_path / "star.png"
     write_image(mask, np.eye(9, dtype=np.uint8) * 200)
     viewer.press("##mask")
-    viewer.until(lambda app: app.state.prompt is not None)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.prompt is not None)
     viewer.type(str(mask))
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.optics.aperture_shape.mask is not None)
     shape = viewer.app.state.optics.aperture_shape
     assert shape.kind == "mask"
-    assert shape.mask is not None
     assert (shape.mask.name, shape.mask.rows, shape.mask.columns) == ("star.png", 9, 9)
     write_image(tmp_path / "dark.png", np.zeros((8, 8), np.uint8))
     viewer.app.do(do(ask, PlainTask("read mask", str(tmp_path / "dark.png"))))
@@ -96,13 +87,12 @@ def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer: Driver, tmp_pa
     assert viewer.app.state.optics.aperture_shape == shape, "a mask without light changes nothing"
 
 
-def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+def test_what_was_chosen_is_there_again_the_next_time(open_window, photo_path, tmp_path):
     kept = tmp_path / "kept"
     first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
     first.until_idle()
     first.press("###section More")
-    first.until(lambda app: "more" in app.state.preferences.open_sections)
-    first.until_idle()
+    first.settle(lambda app: "more" in app.state.preferences.open_sections)
     preferences = first.app.state.preferences
     assert load_preferences(AppState(), kept).preferences.open_sections == preferences.open_sections, "after a crash"
     first.close()
@@ -112,7 +102,7 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo
     assert second.app.state.recent == (str(photo_path),)
 
 
-def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path: Path) -> None:
+def test_stopping_keeps_the_views_that_are_there(open_window, photo_path):
     driver = open_window(photo_path, grid=GridShape(41, 41))
     driver.until(lambda app: app.state.progress.done > 3)
     driver.app.do(do(opening.stop))
@@ -123,7 +113,7 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
     assert "stopped at" in driver.app.state.progress.doing
 
 
-def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: Path) -> None:
+def test_the_panel_says_how_the_photo_was_taken(open_window, tmp_path):
     from PIL import Image
 
     exif = Image.Exif()
@@ -135,18 +125,15 @@ def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: P
     assert driver.app.state.facts.facts == (("Camera", "Maker"), ("Exposure", "1/60 s, ISO 200"))
 
 
-def test_about_opens_the_page_of_releases_only_when_that_is_asked_for(
-    viewer: Driver, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    opened: list[str] = []
+def test_about_opens_the_page_of_releases_only_when_that_is_asked_for(viewer, monkeypatch):
+    opened = []
     pages = {"Releases": "https://example.org/releases", "Documentation": "https://example.org/docs"}
     monkeypatch.setattr("viewer.ui.overlays.about_prompt.program_pages", lambda: pages)
     monkeypatch.setattr("viewer.app.side_effects.typer.launch", lambda place, locate: opened.append(place))
     viewer.send("key", "F1")
     viewer.until(lambda app: app.state.prompt == "help")
     viewer.press("About", "prompt str")
-    viewer.until(lambda app: app.state.prompt == "about")
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.prompt == "about")
     assert not opened
     viewer.press("Look for a newer version", "prompt str")
     viewer.until(lambda app: bool(opened))
@@ -155,16 +142,14 @@ def test_about_opens_the_page_of_releases_only_when_that_is_asked_for(
     assert opened == ["https://example.org/releases", "https://example.org/docs/licences.md"]
 
 
-def test_keys_for_help_palette_text_size_and_exports(viewer: Driver) -> None:
+def test_keys_for_help_palette_text_size_and_exports(viewer):
     viewer.send("key", "F1")
-    viewer.until(lambda app: app.state.prompt == "help")
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.prompt == "help")
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.prompt is None)
     assert not viewer.app.state.should_quit
     viewer.send("key", "ctrl+p")
-    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
-    viewer.until_idle()
+    viewer.settle(lambda app: isinstance(app.state.prompt, PalettePrompt))
     viewer.send("type", "--delay", 20, "light or")
     viewer.until(lambda app: app.state.prompt == PalettePrompt("light or"))
     viewer.send("key", "Return")

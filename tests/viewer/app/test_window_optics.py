@@ -1,30 +1,25 @@
 """The lens in a real window: viewpoint, clicks, tilt handles, racks, presets and undo; and what each edit costs."""
 
-from __future__ import annotations
-
 import pytest
 from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import ViewOffset
-from tests.viewer.conftest import FAR, NEAR, Driver
-from viewer.app.main_loop import App
+from tests.viewer.conftest import FAR, NEAR
 from viewer.model import lens, messages, preferences
-from viewer.model.action import Action, do
+from viewer.model.action import do
 from viewer.model.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.lens import TiltHandles
 from viewer.model.state.notices import Notice
 
 
-def field_disparity(app: App, given: float) -> float:
-    assert app.state.scene is not None
+def field_disparity(app, given):
     plan = app.state.scene.plan
-    assert plan is not None
     return (given - plan.disparity_zero) * plan.disparity_scale
 
 
-def test_pad_loop_and_double_click_move_the_viewpoint(viewer: Driver) -> None:
+def test_pad_loop_and_double_click_move_the_viewpoint(viewer):
     app, io = viewer.app, imgui.get_io()
     # a busy machine may draw for longer than the usual 0.3 s between the two clicks
     io.mouse_double_click_time, io.mouse_single_click_delay = 60.0, 61.0
@@ -32,7 +27,7 @@ def test_pad_loop_and_double_click_move_the_viewpoint(viewer: Driver) -> None:
     for step, end in ((-200, -1.0), (200, 1.0)):
         viewer.send("mousemove", x, y, "mousedown", 1)
         viewer.send("mousemove", x + step, y)
-        viewer.until(lambda app, end=end: app.state.optics.eye.s == end)  # type: ignore[misc]
+        viewer.until(lambda app, end=end: app.state.optics.eye.s == end)
         viewer.send("mouseup", 1)
         viewer.until_idle()
     assert len(app.state.history.past) == 2
@@ -40,8 +35,7 @@ def test_pad_loop_and_double_click_move_the_viewpoint(viewer: Driver) -> None:
     drawn = app.scene_view.pictures_drawn
     viewer.until(lambda app: app.scene_view.pictures_drawn >= drawn + 5)
     viewer.send("key", "space")
-    viewer.until(lambda app: app.state.motion.is_paused)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.motion.is_paused)
     drawn, eye = app.scene_view.pictures_drawn, app.state.optics.eye
     app.step()
     assert (app.scene_view.pictures_drawn, app.state.optics.eye) == (drawn, eye), "nothing moves in a pause"
@@ -49,31 +43,28 @@ def test_pad_loop_and_double_click_move_the_viewpoint(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.motion.kind is None)
     kept = app.state.optics
     viewer.send("mousemove", *viewer.position(0.1, 0.1), "click", "--repeat", 2, "--delay", 40, 1)
-    viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 0))
-    viewer.until_idle()
+    viewer.settle(lambda app: app.state.optics.eye == ViewOffset(0, 0))
     assert app.state.optics.focus_disparity == kept.focus_disparity, "the first click is taken back"
 
 
-def test_two_clicks_are_racked_between_by_a_key(viewer: Driver) -> None:
+def test_two_clicks_are_racked_between_by_a_key(viewer):
     app = viewer.app
     near, far = (pytest.approx(field_disparity(app, given), abs=1e-3) for given in (NEAR, FAR))
     for place, wanted in (((0.5, 0.5), near), ((0.15, 0.15), far)):
         viewer.send("mousemove", *viewer.position(*place))
-        viewer.until(lambda app, w=wanted: app.state.hover is not None and app.state.hover.disparity == w)  # type: ignore[misc]
+        viewer.until(lambda app, w=wanted: app.state.hover is not None and app.state.hover.disparity == w)
         viewer.send("click", 1)
-        viewer.until(lambda app, w=wanted: app.state.optics.focus_disparity == w)  # type: ignore[misc]
-        viewer.until_idle()
+        viewer.settle(lambda app, w=wanted: app.state.optics.focus_disparity == w)
     viewer.send("key", "x")
     viewer.until(lambda app: app.state.motion.kind == "rack" and app.state.optics.focus_disparity == near)
     viewer.until(lambda app: app.state.motion.kind is None)
     assert app.state.optics.focus_disparity == far
 
 
-def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer: Driver) -> None:
+def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer):
     viewer.send("key", "t")
     viewer.until(lambda app: app.state.tilt_handles is not None)
     picture = viewer.app.layout().picture
-    assert picture is not None
     (x, y), _ = handle_points(TiltHandles(), picture)
     viewer.send("mousemove", round(x), round(y), "mousedown", 1)
     viewer.send("mousemove", round(x) + 20, round(y))
@@ -89,23 +80,6 @@ def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer: Driver) -> No
     viewer.until(lambda app: app.state.tilt_handles is None)
     viewer.send("key", "ctrl+z")
     viewer.until(lambda app: app.state.optics == Optics())
-
-
-def test_presets_undo_and_shapes_by_button_and_key(viewer: Driver) -> None:
-    viewer.press("Macro")
-    viewer.until(lambda app: app.state.optics.aperture_diameter > 3)
-    viewer.press("Portrait")
-    viewer.until(lambda app: app.state.optics.focus_range > 0)
-    viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.optics.focus_range == 0)
-    viewer.send("key", "ctrl+shift+z")
-    viewer.until(lambda app: app.state.optics.focus_range > 0)
-    viewer.slide("##Aperture", 0.9)
-    viewer.press("##polygon")
-    viewer.slide("##Blades", 0.0)
-    viewer.slide("##Rotation", 0.5)
-    shape = viewer.app.state.optics.aperture_shape
-    assert (shape.kind, shape.blades, 100 < shape.rotation_deg < 260) == ("polygon", 3, True)
 
 
 DRAWS = (
@@ -126,16 +100,15 @@ ONLY_PANELS = (
 )
 
 
-def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_each_edit_rebuilds(viewer, monkeypatch):
     """Optics draw the picture and nothing else; panels draw panels; only depth strength makes the views again."""
     app = viewer.app
     uploads = count_calls(monkeypatch, app.scene_view.renderer, "upload_view")
 
-    def cost_of(action: Action) -> tuple[bool, ...]:
+    def cost_of(action):
         before = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         app.do(action)
-        viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
-        viewer.until_idle()
+        viewer.settle(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
         after = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         return tuple(a != b for a, b in zip(before, after))
 
@@ -148,12 +121,12 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
     assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=True)) == (True, True, True, True)
 
 
-def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[object]:
+def count_calls(monkeypatch, owner, name):
     """Return a list that grows with every call of a method."""
-    calls: list[object] = []
+    calls = []
     original = getattr(owner, name)
 
-    def counted(*args: object, **kwargs: object) -> object:
+    def counted(*args, **kwargs):
         calls.append(args[:2])
         return original(*args, **kwargs)
 

@@ -1,9 +1,6 @@
 """Prompts in a real window: the list of commands, where to save, what a file that does not open leaves alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +10,6 @@ from iibr_core.exports.kinds import ExportOptions
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
-from tests.viewer.conftest import Driver
-from viewer.app.main_loop import App
 from viewer.app.pace import NoticeClock
 from viewer.model import messages, preferences, saving
 from viewer.model.action import do
@@ -29,40 +24,35 @@ pytestmark = pytest.mark.usefixtures("no_dialogs")
 
 
 @pytest.fixture(autouse=True)
-def soon() -> None:
+def soon():
     """Tooltips come, and windows sleep, when they usually do."""
 
 
-def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Driver) -> None:
-    viewer.app.do(do(messages.show_prompt, PalettePrompt()))
-    viewer.until_idle()
-    place = [command.name for command in COMMANDS].index("Preset: macro")
-    assert place > 12, "else nothing scrolls"
-    for _ in range(place):
-        viewer.send("key", "Down")
-        viewer.app.step()
-    viewer.until(lambda app: app.state.prompt == PalettePrompt("", place))
-    viewer.until_idle()
-    viewer.send("key", "Return")
-    viewer.until(lambda app: app.state.optics.aperture_diameter > 3)
-    assert viewer.app.state.prompt is None
-
-
-def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(viewer: Driver) -> None:
-    """In slow frames: a letter for each of those that it takes to come up."""
+def test_the_palette_loses_nothing_that_is_typed_early_and_arrows_and_enter_run_a_command(viewer):
+    """In slow frames: a letter for each of those that it takes to come up. The command is far down the list."""
     viewer.app.do(do(messages.show_prompt, PalettePrompt()))
     for typed in ("d", "i", "f", "f", "er"):
         imgui.get_io().add_input_characters_utf8(typed)
         viewer.app.step()
     viewer.until_idle()
     assert viewer.app.state.prompt == PalettePrompt("differ")
+    place = [command.name for command in COMMANDS].index("Preset: macro")
+    assert place > 12, "else nothing scrolls"
+    viewer.do(do(messages.show_prompt, None))
+    viewer.do(do(messages.show_prompt, PalettePrompt("", place - 3)))
+    for _ in range(3):
+        viewer.send("key", "Down")
+        viewer.app.step()
+    viewer.settle(lambda app: app.state.prompt == PalettePrompt("", place))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.optics.aperture_diameter > 3)
+    assert viewer.app.state.prompt is None
 
 
-def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
+def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer):
     for hides_panel in (False, True):
         viewer.app.state = replace(viewer.app.state, hides_panel=hides_panel)
-        viewer.app.do(do(messages.show_prompt, "help"))
-        viewer.until_idle()
+        viewer.do(do(messages.show_prompt, "help"))
         pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
         assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
         assert pad.scroll_max.x == pad.scroll_max.y == 0, "its rows scroll, its button stays"
@@ -71,7 +61,7 @@ def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(v
         viewer.until(lambda app: app.state.prompt is None)
 
 
-def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
+def test_tooltips_come_up_before_the_window_sleeps(viewer):
     for button in ("Portrait", "Macro"):
         viewer.find(button)
         viewer.until_idle()
@@ -84,9 +74,8 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
 
 
 @pytest.mark.usefixtures("wide_window")
-def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver) -> None:
-    viewer.app.do(do(preferences.set_font_scale, 2.0), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
-    viewer.until_idle()
+def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer):
+    viewer.do(do(preferences.set_font_scale, 2.0), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
     viewer.find("##3D strength", "prompt ExportPrompt")
     viewer.until_idle()
     tip, prompt = (imgui.internal.find_window_by_name(name) for name in ("##Tooltip_00", "prompt ExportPrompt"))
@@ -96,69 +85,65 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver) -> None:
     assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
 
 
-def test_the_number_of_views_of_a_light_field_is_set_in_the_prompt(viewer: Driver) -> None:
-    viewer.app.do(do(messages.show_prompt, ExportPrompt("hci", "field")))
+def test_the_number_of_views_of_a_light_field_is_set_in_the_prompt(viewer):
+    viewer.do(do(messages.show_prompt, ExportPrompt("hci", "field")))
     viewer.press("##views", "prompt ExportPrompt")
     viewer.type("5")
     prompt = viewer.app.state.prompt
-    assert isinstance(prompt, ExportPrompt)
     assert prompt.options == ExportOptions(grid=GridShape(5, 5))
 
 
-def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer: Driver) -> None:
-    viewer.app.do(do(saving.ask_to_export))
-    viewer.until_idle()
+def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer):
+    viewer.do(do(saving.ask_to_export))
     viewer.press("##kind", "prompt ExportPrompt")
     viewer.until(lambda app: is_menu_open())
     viewer.send("key", "Escape")
-    viewer.until(lambda app: not is_menu_open())
-    viewer.until_idle()
+    viewer.settle(lambda app: not is_menu_open())
     assert isinstance(viewer.app.state.prompt, ExportPrompt)
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.prompt is None)
 
 
-def is_menu_open() -> bool:
+def is_menu_open():
     return bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
 
 
-def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(do(saving.ask_to_save))
-    viewer.until_idle()
-
+def test_a_wrong_ending_keeps_what_was_typed_and_a_problem_moves_neither_the_prompt_nor_its_buttons(viewer, tmp_path):
+    viewer.do(do(saving.ask_to_save))
     viewer.type(str(tmp_path / "a.jqg"))
     viewer.send("key", "Return")
     viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and bool(app.state.prompt.problem))
     prompt = viewer.app.state.prompt
-    assert isinstance(prompt, SavePrompt)
     assert prompt.path == str(tmp_path / "a.jqg")
     assert ".png" in prompt.problem
     viewer.until_idle()
-
     viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.prompt is None)
+    viewer.settle(lambda app: app.state.prompt is None)
+    places = []
+    for problem in ("", "This is the open photo. Choose another name."):
+        viewer.do(do(messages.show_prompt, SavePrompt("scene.png", ScreenSize(48, 32), problem=problem)))
+        window = imgui.internal.find_window_by_name("prompt SavePrompt")
+        places.append((window.pos.y, viewer.find("Save", "prompt SavePrompt")))
+    assert places[0] == places[1]
 
 
-def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver) -> None:
+def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer):
     heights = []
     for number in range(3):
-        viewer.app.do(do(messages.notify, Notice(f"Notice {number}, as long as the others are.")))
-        viewer.until_idle()
+        viewer.do(do(messages.notify, Notice(f"Notice {number}, as long as the others are.")))
         heights.append(imgui.internal.find_window_by_name("notices").size.y)
     assert heights[2] == heights[1], "they do not pile up"
     viewer.press("Close all (3)", "notices")
     viewer.until(lambda app: not app.state.notices)
-    viewer.app.do(do(messages.notify, Notice("A message that goes with the first click.")))
-    viewer.until_idle()
+    viewer.do(do(messages.notify, Notice("A message that goes with the first click.")))
     viewer.find("×", "notices")
     viewer.send("click", "--repeat", 2, "--delay", 200, 1)
-    viewer.until(lambda app: not app.state.notices)
-    viewer.until_idle()
+    viewer.settle(lambda app: not app.state.notices)
     assert viewer.app.state.focused_at is None, "a double click on a message never reaches the picture"
     assert not viewer.app.state.history.past
 
 
-def test_results_go_unless_the_pointer_rests_on_them_and_errors_stay() -> None:
+def test_results_go_unless_the_pointer_rests_on_them_and_errors_stay():
     clock, error, result = NoticeClock(), Notice("It failed.", is_error=True), Notice("Saved", is_result=True)
     state = AppState(notices=(error, result))
     for now_s, is_held in ((0.0, False), (RESULT_S, True), (1.9 * RESULT_S, False)):
@@ -168,16 +153,14 @@ def test_results_go_unless_the_pointer_rests_on_them_and_errors_stay() -> None:
     assert clock.expire(state, 0.0, False) == clock.expire(state, 1e9, False) == []
 
 
-def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path: Path) -> None:
+def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer, tmp_path):
     (tmp_path / "inner").mkdir()
     write_image(tmp_path / "inner" / "other.png", np.full((64, 96, 3), 100, np.uint8))
     viewer.app.do(BY_NAME["Open a photo…"].action(viewer.app.state))
-    viewer.until(lambda app: typed_path(app) == f"{tmp_path}/")
-    viewer.until_idle()
+    viewer.settle(lambda app: typed_path(app) == f"{tmp_path}/")
     viewer.type(str(tmp_path / "inner" / "othr.png"))
     viewer.send("key", "Return")
-    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and bool(app.state.prompt.problem))
-    viewer.until_idle()
+    viewer.settle(lambda app: isinstance(app.state.prompt, PathPrompt) and bool(app.state.prompt.problem))
     before = viewer.app.state
     viewer.send("type", "fkvtg")
     viewer.until_idle()
@@ -190,19 +173,18 @@ def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path
     assert viewer.app.state.prompt is None
 
 
-def typed_path(app: App) -> str | None:
+def typed_path(app):
     return app.state.prompt.path if isinstance(app.state.prompt, PathPrompt) else None
 
 
-def cells(viewer: Driver) -> str:
+def cells(viewer):
     """The name of the part of the prompt that shows what a folder holds."""
-    viewer.until(lambda app: bool(browsed_paths(app.state)))
-    viewer.until_idle()
+    viewer.settle(lambda app: bool(browsed_paths(app.state)))
     prompt = imgui.internal.find_window_by_name("prompt PathPrompt")
     return f"prompt PathPrompt/entries_{prompt.get_id('entries'):08X}"
 
 
-def test_a_folder_is_walked_through_by_clicks_and_tab_completes_names(viewer: Driver, tmp_path: Path) -> None:
+def test_a_folder_is_walked_through_by_clicks_and_tab_completes_names(viewer, tmp_path):
     (tmp_path / "Inner" / "deep").mkdir(parents=True)
     for name in ("deep/one.png", "other.png"):
         write_image(tmp_path / "Inner" / name, np.full((64, 96, 3), 100, np.uint8))
@@ -218,13 +200,3 @@ def test_a_folder_is_walked_through_by_clicks_and_tab_completes_names(viewer: Dr
     viewer.press("photo other.png", cells(viewer))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
     assert viewer.app.state.prompt is None
-
-
-def test_a_problem_moves_neither_the_prompt_nor_its_buttons(viewer: Driver) -> None:
-    places = []
-    for problem in ("", "This is the open photo. Choose another name."):
-        viewer.app.do(do(messages.show_prompt, SavePrompt("scene.png", ScreenSize(48, 32), problem=problem)))
-        viewer.until_idle()
-        window = imgui.internal.find_window_by_name("prompt SavePrompt")
-        places.append((window.pos.y, viewer.find("Save", "prompt SavePrompt")))
-    assert places[0] == places[1]

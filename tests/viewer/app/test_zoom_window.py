@@ -1,44 +1,36 @@
 """Zoom and pan in a real window, by real mouse and key events."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import NEAR, Driver, Opener
+from tests.viewer.conftest import NEAR
 from viewer.background.newest import Newest
 from viewer.model import lens, viewpoint
 from viewer.model.action import do
 from viewer.model.state.viewpoint import Zoom
 
 
-def zoom_to(viewer: Driver, zoom: Zoom | None) -> None:
+def zoom_to(viewer, zoom):
     viewer.app.do(do(viewpoint.set_zoom, zoom))
 
 
-def until_sharp(viewer: Driver) -> np.ndarray:
+def until_sharp(viewer):
     """Return the visible part from the photo's own pixels, once it is shown."""
-    viewer.until(lambda app: app.sharpener.pixels is not None)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.sharpener.pixels is not None)
     pixels = viewer.app.sharpener.pixels
-    assert pixels is not None
     return pixels.astype(int)
 
 
 @pytest.mark.usefixtures("wide_window")
-def test_wheel_keys_and_middle_button_zoom_and_pull_the_picture(viewer: Driver) -> None:
+def test_wheel_keys_and_middle_button_zoom_and_pull_the_picture(viewer):
     app, whole, optics = viewer.app, viewer.image().astype(int), viewer.app.state.optics
     x, y = viewer.position(0.25, 0.5)
     viewer.send("mousemove", x, y, "keydown", "ctrl", "click", 4, "click", 4, "click", 4, "keyup", "ctrl")
-    viewer.until(lambda app: app.layout().part.width < 0.8)
-    viewer.until_idle()
+    viewer.settle(lambda app: app.layout().part.width < 0.8)
     part, frame = app.layout().part, app.layout().frame
-    assert frame is not None
     assert part.x + (x - frame.x) / frame.width * part.width == pytest.approx(0.25, abs=0.02)
     image = viewer.image().astype(int)
     rows = (part.y + (np.arange(image.shape[0]) + 0.5) / image.shape[0] * part.height) * whole.shape[0]
@@ -52,28 +44,24 @@ def test_wheel_keys_and_middle_button_zoom_and_pull_the_picture(viewer: Driver) 
     viewer.send("mouseup", 2, "key", "1")
     viewer.until(lambda app: app.layout().scale == 1.0)
     frame_px = app.layout().frame_px
-    assert frame_px is not None
     assert frame_px.size == (96, 64)
     viewer.send("key", "0")
     viewer.until(lambda app: app.state.zoom is None)
     assert app.state.optics == optics, "nothing else was moved"
 
 
-def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer: Driver) -> None:
+def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer):
     scene = viewer.app.state.scene
-    assert scene is not None
-    assert scene.plan is not None
     zoom_to(viewer, Zoom(4 * viewer.app.layout().fit, (0.5, 0.5)))
     viewer.until_idle()
     frame = viewer.app.layout().frame
-    assert frame is not None
     # At the left border of the frame: unzoomed, the far wall would be there.
     viewer.send("mousemove", round(frame.x + 0.1 * frame.width), round(frame.y + frame.height / 2), "click", 1)
     near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
     viewer.until(lambda app: app.state.optics.focus_disparity == pytest.approx(near, abs=0.2))
 
 
-def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window: Opener, photo_path: Path) -> None:
+def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window, photo_path):
     viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
     viewer.until_idle()
     app, photo = viewer.app, read_photo(photo_path).pixels * 255
@@ -94,18 +82,15 @@ def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window
     viewer.until(lambda app: app.sharpener.pixels is None)
 
 
-def test_a_photo_that_is_gone_is_reported_once_and_the_views_stay(
-    open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_photo_that_is_gone_is_reported_once_and_the_views_stay(open_window, photo_path, monkeypatch):
     viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
     viewer.until_idle()
     photo_path.unlink()
     zoom_to(viewer, Zoom(1.0))
-    viewer.until(lambda app: any("full detail" in notice.text for notice in app.state.notices))
-    viewer.until_idle()
+    viewer.settle(lambda app: any("full detail" in notice.text for notice in app.state.notices))
     assert viewer.app.sharpener.pixels is None
     assert viewer.image().std() > 10
-    asked: list[object] = []
+    asked = []
     monkeypatch.setattr(Newest, "submit", lambda _, request: asked.append(request))
     for place in ((0.3, 0.5), (0.6, 0.4)):
         zoom_to(viewer, Zoom(12.0, place))

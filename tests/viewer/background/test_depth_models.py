@@ -1,18 +1,13 @@
 """An estimate of depth belongs to the photo that it was made for, whatever is open when it comes."""
 
-from __future__ import annotations
-
 from contextlib import closing
-from pathlib import Path
 from threading import Event
-
-import pytest
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.models import cache
 from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.scene import LoadedPhoto, SceneReady, SceneRequest, Source
+from iibr_core.scenes.scene import SceneRequest, Source
 from iibr_core.types import GridShape
 from tests.iibr_core.depth.onnx_graphs import weighing
 from tests.viewer.conftest import reduce, write_scene
@@ -24,18 +19,14 @@ from viewer.model.state.app_state import AppState
 DEADLINE_S = 60.0
 
 
-def opened(state: AppState, source: Source) -> tuple[AppState, LoadedPhoto]:
+def opened(state, source):
     """Return the state with a photo open whose depth is guessed, and the photo."""
     state = reduce(state, do(opening.open_source, source))
     ready = next(results_of(SceneRequest(state.generation, source, asks_model=False), lambda: CENTRE))
-    assert isinstance(ready, SceneReady)
-    assert ready.loaded is not None
     return reduce(state, do(opening.show_scene, ready.generation, ready.scene)), ready.loaded
 
 
-def test_an_estimate_that_comes_after_the_next_photo_was_asked_for_is_not_shown_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_estimate_that_comes_after_the_next_photo_was_asked_for_is_not_shown_with_it(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path / "estimates")
     model = str(weighing(tmp_path / "own.onnx", (1, 1, 1)))
     paths = (write_scene(tmp_path, name) for name in ("a", "b"))

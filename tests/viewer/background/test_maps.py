@@ -1,9 +1,5 @@
 """The entropy map of a view, beside a plain computation."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
@@ -13,13 +9,13 @@ from iibr_core.method.plan import plan_for_viewing
 from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from tests.viewer.conftest import write_scene
-from viewer.background.maps import Entropy, EntropyRequest, EntropyWork
+from viewer.background.maps import EntropyRequest, EntropyWork
 
 
-def test_the_map_is_the_entropy_of_the_weights_of_its_view(tmp_path: Path) -> None:
+def test_the_map_is_the_entropy_of_the_weights_of_its_view(tmp_path):
     loaded = load_photo(Source(str(write_scene(tmp_path))))
     plan = plan_for_viewing(loaded.photo, loaded.disparity)
-    found: list[Entropy] = []
+    found = []
     work = EntropyWork()
     for view in ((0, 0), plan.grid.centre, (0, 1)):
         work(EntropyRequest(1, view, loaded, plan, DEFAULT_INPAINTER), found.append)

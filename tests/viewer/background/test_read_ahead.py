@@ -1,9 +1,6 @@
 """Photos read before they are asked for: in which order, what gives way to what, what is forgotten."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Iterator
 
 import pytest
 
@@ -15,7 +12,7 @@ from viewer.background.read_ahead import ReadAhead
 DEADLINE_S = 60.0
 
 
-def photo(name: str, depth_strength: float = 1.0) -> WantedPhoto:
+def photo(name, depth_strength=1.0):
     return WantedPhoto(Source(name), depth_strength)
 
 
@@ -25,13 +22,13 @@ A, B, C, BAD = (photo(name) for name in ("a", "b", "c", "bad"))
 class Shelf:
     """Reads names. begun: in this order; a photo that is `held` is not finished before it is let go."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self._woken, self._may_go_on = threading.Semaphore(0), threading.Event()
-        self.begun: list[str] = []
+        self.begun = []
         self.held = ""
         self.ahead = ReadAhead("test", self._woken.release, self._read)
 
-    def _read(self, wanted: WantedPhoto) -> str:
+    def _read(self, wanted):
         name = wanted.source.path
         self.begun.append(name)
         self._woken.release()
@@ -42,17 +39,17 @@ class Shelf:
             raise_if_stopped()
         return f"{name} {wanted.depth_strength:g}"
 
-    def let_go(self) -> None:
+    def let_go(self):
         self.held = ""
         self._may_go_on.set()
 
-    def want_until_done(self, *wanted: WantedPhoto) -> None:
+    def want_until_done(self, *wanted):
         self.ahead.want(wanted)
         while not all(map(self.ahead.is_done, wanted)):
             assert self._woken.acquire(timeout=DEADLINE_S), "the reader went silent"
             self.ahead.want(wanted)
 
-    def want_until_begun(self, name: str, *wanted: WantedPhoto) -> None:
+    def want_until_begun(self, name, *wanted):
         self.ahead.want(wanted)
         while name not in self.begun:
             assert self._woken.acquire(timeout=DEADLINE_S), "the reader went silent"
@@ -60,14 +57,14 @@ class Shelf:
 
 
 @pytest.fixture
-def shelf() -> Iterator[Shelf]:
+def shelf():
     made = Shelf()
     yield made
     made.let_go()
     made.ahead.close()
 
 
-def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_more(shelf: Shelf) -> None:
+def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_more(shelf):
     shelf.want_until_done(B, A)
     shelf.want_until_done(A, B, C)
     assert shelf.begun == ["b", "a", "c"]
@@ -80,7 +77,7 @@ def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_mo
     assert shelf.ahead.get(A) == "read elsewhere"
 
 
-def test_what_cannot_be_read_is_done_and_not_tried_again(shelf: Shelf) -> None:
+def test_what_cannot_be_read_is_done_and_not_tried_again(shelf):
     shelf.want_until_done(BAD, A)
     shelf.want_until_done(A, BAD)
     assert shelf.ahead.get(BAD) is None
@@ -88,7 +85,7 @@ def test_what_cannot_be_read_is_done_and_not_tried_again(shelf: Shelf) -> None:
 
 
 @pytest.mark.parametrize("wanted", [(B, A), (B,)], ids=["first", "alone"])
-def test_what_is_wanted_first_does_not_wait_for_another(shelf: Shelf, wanted: tuple[WantedPhoto, ...]) -> None:
+def test_what_is_wanted_first_does_not_wait_for_another(shelf, wanted):
     shelf.held = "a"
     shelf.want_until_begun("a", A)
     shelf.ahead.want(wanted)
@@ -98,7 +95,7 @@ def test_what_is_wanted_first_does_not_wait_for_another(shelf: Shelf, wanted: tu
     assert shelf.begun == ["a", "b", *("a" for photo in wanted if photo is A)]
 
 
-def test_what_is_being_read_goes_on_while_the_first_is_there(shelf: Shelf) -> None:
+def test_what_is_being_read_goes_on_while_the_first_is_there(shelf):
     shelf.want_until_done(A)
     shelf.held = "b"
     shelf.want_until_begun("b", A, B)

@@ -1,14 +1,11 @@
 """Paths handed over to the open window: one window listens, and nothing that any program sends disturbs it."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket
 import struct
 import tempfile
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
@@ -24,7 +21,7 @@ SHORT = struct.Struct("!i")
 
 
 @pytest.fixture(autouse=True)
-def runtime_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def runtime_folder(monkeypatch):
     """A folder with a short name: the system limits the length of a socket's path."""
     with tempfile.TemporaryDirectory() as folder:
         monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
@@ -33,25 +30,25 @@ def runtime_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.fixture
-def receiver() -> Iterator[Receiver]:
+def receiver():
     with closing(listening()) as window:
         yield window
 
 
-def listening() -> Receiver:
+def listening():
     window = Receiver(lambda: None)
     window.listen()
     return window
 
 
-def hand_over_when_heard(*paths: str) -> None:
+def hand_over_when_heard(*paths):
     """A thread takes its time to begin to listen."""
     end = time.monotonic() + DEADLINE_S
     while not hand_over(list(paths)):
         assert time.monotonic() < end
 
 
-def test_the_latest_paths_are_received_once(receiver: Receiver) -> None:
+def test_the_latest_paths_are_received_once(receiver):
     assert receiver.take() is None
     hand_over_when_heard("/photos/a.png")
     hand_over_when_heard("/photos/ä.png", "/photos/\udcff.png")
@@ -61,7 +58,7 @@ def test_the_latest_paths_are_received_once(receiver: Receiver) -> None:
     assert receiver.take() == (), "a start without paths brings the window to the front"
 
 
-def test_one_of_two_windows_listens_and_the_other_after_it_although_a_killed_one_left_its_socket() -> None:
+def test_one_of_two_windows_listens_and_the_other_after_it_although_a_killed_one_left_its_socket():
     with socket.socket(socket.AF_UNIX) as left:
         left.bind(window_address() or "")
     with closing(listening()) as first:
@@ -78,7 +75,7 @@ def test_one_of_two_windows_listens_and_the_other_after_it_although_a_killed_one
     assert not Receiver(lambda: None).has_another()
 
 
-def test_a_window_that_waits_to_listen_closes_at_once_and_never_listens(receiver: Receiver) -> None:
+def test_a_window_that_waits_to_listen_closes_at_once_and_never_listens(receiver):
     hand_over_when_heard("/a.png")
     listening().close()
     receiver.close()
@@ -94,7 +91,7 @@ CUT_MESSAGE = SHORT.pack(100) + b"half"
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\n\r\n", CUT_MESSAGE, SHORT.pack(MAX_BYTES + 1), *MESSAGES])
-def test_other_bytes_change_nothing(receiver: Receiver, sent: bytes) -> None:
+def test_other_bytes_change_nothing(receiver, sent):
     hand_over_when_heard("/a.png")
     receiver.take()
     with socket.socket(socket.AF_UNIX) as stranger:
@@ -109,7 +106,7 @@ def test_other_bytes_change_nothing(receiver: Receiver, sent: bytes) -> None:
     assert receiver.take() == ("/b.png",)
 
 
-def test_a_window_closes_although_senders_hold_it_up(receiver: Receiver) -> None:
+def test_a_window_closes_although_senders_hold_it_up(receiver):
     hand_over_when_heard("/a.png")
     with ExitStack() as strangers:
         for _ in range(8):
@@ -117,7 +114,7 @@ def test_a_window_closes_although_senders_hold_it_up(receiver: Receiver) -> None
         receiver.close()
 
 
-def test_displays_have_their_own_windows_and_a_foreign_folder_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_displays_have_their_own_windows_and_a_foreign_folder_has_none(monkeypatch):
     first = window_address()
     monkeypatch.setenv("DISPLAY", ":7/7")
     assert window_address() not in (first, None)

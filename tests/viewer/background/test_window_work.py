@@ -1,27 +1,24 @@
 """Work that other threads hand to the window's: in steps, what is urgent first, nothing for those who left."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Callable, Generator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from iibr_core.runtime.work import Cancelled, in_this_job, never, stoppable
 from iibr_core.types import InputError
-from viewer.background.window_work import Steps, WindowWork
+from viewer.background.window_work import WindowWork
 
 
 class Desk:
     """A window's thread, and others that ask it."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.asked = threading.Semaphore(0)
         self.work = WindowWork(self.asked.release)
         self.pool = ThreadPoolExecutor(4)
 
-    def ask(self, steps: Steps[str], should_stop: Callable[[], bool] = never, is_urgent: bool = False) -> Future[str]:
+    def ask(self, steps, should_stop=never, is_urgent=False):
         """Hand it over; it waits there when this returns."""
         with stoppable(should_stop):
             future = self.pool.submit(in_this_job(self.work.run), steps, is_urgent)
@@ -30,13 +27,13 @@ class Desk:
 
 
 @pytest.fixture
-def desk() -> Generator[Desk]:
+def desk():
     desk = Desk()
     yield desk
     desk.pool.shutdown()
 
 
-def counting(name: str, taken: list[str], count: int = 2) -> Steps[str]:
+def counting(name, taken, count=2):
     try:
         for _ in range(count):
             taken.append(name)
@@ -46,8 +43,8 @@ def counting(name: str, taken: list[str], count: int = 2) -> Steps[str]:
         taken.append(f"end of {name}")
 
 
-def test_what_is_urgent_comes_first_and_results_go_to_who_asked(desk: Desk) -> None:
-    taken: list[str] = []
+def test_what_is_urgent_comes_first_and_results_go_to_who_asked(desk):
+    taken = []
     later, urgent = desk.ask(counting("later", taken)), desk.ask(counting("urgent", taken), is_urgent=True)
     desk.work.advance(0.0)
     assert taken == ["urgent"], "a step at least, and no more than there is time for"
@@ -57,8 +54,8 @@ def test_what_is_urgent_comes_first_and_results_go_to_who_asked(desk: Desk) -> N
     assert not desk.work.is_waiting
 
 
-def test_steps_that_fail_fail_where_they_were_asked_for(desk: Desk) -> None:
-    def failing() -> Steps[str]:
+def test_steps_that_fail_fail_where_they_were_asked_for(desk):
+    def failing():
         yield
         raise InputError("no room on the graphics card")
 
@@ -69,8 +66,8 @@ def test_steps_that_fail_fail_where_they_were_asked_for(desk: Desk) -> None:
     assert other.result(60) == "other"
 
 
-def test_steps_that_nobody_waits_for_are_ended(desk: Desk) -> None:
-    taken: list[str] = []
+def test_steps_that_nobody_waits_for_are_ended(desk):
+    taken = []
     given_up = threading.Event()
     future = desk.ask(counting("a", taken, count=9), given_up.is_set)
     desk.work.advance(0.0)

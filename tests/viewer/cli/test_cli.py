@@ -23,6 +23,7 @@ from tests.iibr_core import red_inpainter
 from tests.iibr_core.known_scenes import write_llff_row
 from tests.viewer.cli.conftest import output_of, refusal_of
 from tests.viewer.conftest import HEIGHT, WIDTH
+from viewer.cli.export_options import budget_from_text
 from viewer.cli.main import COMMANDS
 from viewer.cli.options import grid_from_text, number_from_text, size_from_text, view_from_text
 from viewer.model.demo_photo import demo_photo
@@ -99,6 +100,7 @@ def test_values_from_text():
     assert view_from_text("2,-1.5") == ViewOffset(t=-1.5, s=2.0)
     assert view_from_text("-0, 1e1") == ViewOffset(t=10.0, s=0.0)
     assert number_from_text("-1e-3") == -0.001
+    assert [budget_from_text(text) for text in ("3MB", "500kB", "1.5 M", "70000")] == [3e6, 5e5, 1.5e6, 7e4]
 
 
 def test_generate_writes_a_light_field_that_opens(iibr, photo_path, tmp_path):
@@ -117,25 +119,28 @@ def test_options_of_earlier_versions_are_understood_or_ignored(iibr, photo_path,
 
 
 @pytest.mark.parametrize(
-    ("words", "is_literal"),
+    ("words", "times"),
     [
-        ((), False),
-        (("--literal",), True),
-        (("--disparity", "{map}"), True),
-        (("--disparity", "{map}", "--planned"), False),
+        ((), 1.0),
+        (("--depth-strength", 0.5), 0.5),
+        (("--literal",), None),
+        (("--disparity", "{map}"), None),
+        (("--disparity", "{map}", "--planned"), 1.0),
     ],
 )
-def test_a_named_map_is_taken_as_it_is(iibr, photo_path, tmp_path, words, is_literal):
-    """As given, the square moves by 3 px from view to view: 12 of 96 from the first to the last."""
+def test_a_named_map_is_taken_as_it_is(iibr, photo_path, tmp_path, words, times):
+    """As given, the square moves by 3 px from view to view: 12 of 96 from the first to the last. times: the parallax of
+    the window, None where it is as given.
+    """
     out, given = tmp_path / "field", photo_path.with_name("scene_disparity.npy")
-    words = tuple(word.replace("{map}", str(given)) for word in words)
+    words = (str(word).replace("{map}", str(given)) for word in words)
     done = iibr("generate", photo_path, "--grid", 5, "--refine", "off", "-o", out, *words)
     values = read_pfm(out / "gt_disp_lowres.pfm")
-    if is_literal:
+    if times is None:
         np.testing.assert_array_equal(values, np.load(given))
     else:
-        assert 4 * float(values.max() - values.min()) == pytest.approx(TOTAL_PARALLAX * WIDTH)
-    assert ("In the window it is 4%" in done.stderr) == is_literal
+        assert 4 * float(np.ptp(values)) == pytest.approx(times * TOTAL_PARALLAX * WIDTH)
+    assert ("In the window it is 4%" in done.stderr) == (times is None)
 
 
 def test_inpaint_names_the_method_for_generate_and_screenshot(iibr, monkeypatch, photo_path, tmp_path):

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from iibr_core.evaluation.metrics import psnr
+from iibr_core.gloss.settings import Gloss
+from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene
@@ -34,6 +36,13 @@ def test_pictures_are_quick_first_and_converge(tmp_path, count, aperture):
         shown = view.screen.read()
         moved = replace(weave, eyes=weave.eyes[::-1])
         assert view.draw(moved, math.inf) != last
+        gloss = Gloss(roughness=0.5, reflectance=0.5)
+        glossy = replace(weave, eyes=tuple(replace(eye, optics=replace(eye.optics, gloss=gloss)) for eye in weave.eyes))
+        view.draw(glossy, math.inf)
+        matt = view.screen.read()
+        scene.view.take_gloss(make_maps(scene.view.gloss_request(gloss)))
+        view.draw(glossy, math.inf)
+        assert view.screen.read().astype(int).sum() > matt.astype(int).sum(), "maps that come later are seen"
         view.release()
         pair = weave.eyes[:2]
         wanted = np.hstack([scene.draw(each) for each in pair])

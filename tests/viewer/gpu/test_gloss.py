@@ -57,11 +57,13 @@ def test_the_photo_with_gloss_is_the_cores(renderer, gloss, infinity):
     assert rms(renderer.read_image(), expected) < 0.004
 
 
+@pytest.mark.parametrize("row_step", [1.0, 0.4])
 @pytest.mark.parametrize(("gloss", "eye"), [(LIT, ViewOffset(0.5, -0.5)), (METAL, ViewOffset(-1.0, 1.0))])
-def test_other_viewpoints_are_the_cores_too(renderer, gloss, eye):
+def test_other_viewpoints_are_the_cores_too(renderer, gloss, eye, row_step):
     photo, maps = open_flat(renderer, gloss)
+    renderer.field.row_step = row_step
     renderer.render(Optics(eye=eye, gloss=gloss), (WIDTH, HEIGHT))
-    assert rms(renderer.read_image(), shaded(gloss, maps, photo, eye)) < 0.006
+    assert rms(renderer.read_image(), shaded(gloss, maps, photo, ViewOffset(row_step * eye.t, eye.s))) < 0.006
 
 
 @pytest.mark.parametrize(("gloss", "is_upright"), [(LIT, False), (METAL, True)])

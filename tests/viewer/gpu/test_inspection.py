@@ -6,7 +6,7 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes
+from tests.viewer.gpu.scenes import TwoPlanes, eyes_of_pixels
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.layout import PixelRect
@@ -87,13 +87,15 @@ def test_the_disparity_overlay_at_a_stored_view_is_its_map_in_colours(renderer, 
     np.testing.assert_allclose(overlay[..., 3], 127.5, atol=1)
 
 
-@pytest.mark.parametrize("eye", [ViewOffset(0.4, -0.3), ViewOffset(-2.7, 3.4)])
-def test_between_views_the_overlay_lies_where_the_eye_sees_the_surfaces(renderer, passes, eye):
-    view = min(4, max(0, round(eye.t) + 2)), min(6, max(0, round(eye.s) + 3))
-    passes.draw_overlay(full(renderer), Optics(eye=eye), view, SIZE, LOOK)
+@pytest.mark.parametrize(
+    "optics", [Optics(ViewOffset(0.4, -0.3)), Optics(ViewOffset(-2.7, 3.4)), Optics(ViewOffset(0.2, 0.0), dolly=4.0)]
+)
+def test_between_views_the_overlay_lies_where_the_eye_sees_the_surfaces(renderer, passes, optics):
+    view = min(4, max(0, round(optics.eye.t) + 2)), min(6, max(0, round(optics.eye.s) + 3))
+    passes.draw_overlay(full(renderer), optics, view, SIZE, LOOK)
     near = passes.read("overlay")[..., 0].astype(int) > 128  # viridis: only its light end is red
-    np.testing.assert_array_equal(near.any(), True)
-    assert (near != (SCENE.view(eye)[1] > 0)).mean() < 0.01
+    assert near.any()
+    assert (near != (SCENE.view(ViewOffset(*eyes_of_pixels(optics, SCENE)))[1] > 0)).mean() < 0.01
 
 
 def test_values_are_laid_over_the_surface_they_belong_to(renderer, passes):

@@ -1,9 +1,6 @@
 """Editing of depth: verbs, undo, and the map that the worker makes of the edits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +11,6 @@ from iibr_core.depth.editing.edits import (
     DEPTH_TOOLS,
     GAMMA_LIMITS,
     RADIUS_LIMITS,
-    BrushTool,
     DepthEdits,
     Patch,
     Stroke,
@@ -34,9 +30,7 @@ from viewer.model.commands import action_for_path
 from viewer.model.layout import layout_of
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.saving import settings_of
-from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
-from viewer.model.state.prompts import SavePrompt
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
 GRID = GridShape(3, 3)
@@ -45,14 +39,14 @@ SAMPLE = DepthSample((0.7, 0.2), 1.5)
 STROKE = Stroke("nearer", ((0.2, 0.5), (0.8, 0.5)), 0.05, 0.5)
 
 
-def opened(source: Source | None = None) -> AppState:
+def opened(source=None):
     """A photo with a plan, brush in hand."""
     source = source or Source("a.png")
     state = state_with(scene_of(GRID, source=source, plan=plan_of(GRID, scale=1.0)))
     return replace(state, source=source, brush=Brush(radius=0.06, is_on=True))
 
 
-def test_clips_do_not_cross_and_values_are_clamped() -> None:
+def test_clips_do_not_cross_and_values_are_clamped():
     state = depth.set_tone(opened(), DepthEdits(far_clip=0.3, near_clip=0.6), True)
     pushed = depth.set_tone(state, DepthEdits(far_clip=0.9, near_clip=0.6), True).depth.edits
     assert pushed.far_clip < pushed.near_clip == 0.6
@@ -66,7 +60,7 @@ def test_clips_do_not_cross_and_values_are_clamped() -> None:
     assert depth.pick(opened(), DepthSample((0.5, 0.5), float("inf"))) == opened()
 
 
-def test_a_stroke_keeps_points_that_lie_apart() -> None:
+def test_a_stroke_keeps_points_that_lie_apart():
     state = opened()
     for place in ((0.1, 0.1), (0.101, 0.1), (0.3, 0.1)):
         state = depth.paint(state, place)
@@ -75,7 +69,7 @@ def test_a_stroke_keeps_points_that_lie_apart() -> None:
 
 
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
-def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens(tool: BrushTool) -> None:
+def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens(tool):
     start = depth.set_brush(opened(), Brush(tool, strength=0.2, is_on=True))
     picked = depth.pick(start, SAMPLE)
     for state, taken_from in ((start, None), (picked, SAMPLE.place)):
@@ -83,7 +77,7 @@ def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens
     assert opening.show_scene(picked, 1, scene_of(GRID, source=Source("b.png"))).brush.sample is None
 
 
-def test_the_depth_of_a_light_field_is_left_alone() -> None:
+def test_the_depth_of_a_light_field_is_left_alone():
     start = state_with(scene_of())
     assert depth.set_tone(start, TONE, True) == start
     refused = depth.set_brush(start, Brush(is_on=True))
@@ -91,7 +85,7 @@ def test_the_depth_of_a_light_field_is_left_alone() -> None:
     assert "cannot be edited" in refused.notices[-1].text
 
 
-def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
+def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back():
     edited = depth.set_refine(depth.set_tone(opened(), TONE, True), False)
     source = Source("b.png", DepthChoice(refine=False))
     asked = opening.open_source(edited, source)
@@ -101,16 +95,15 @@ def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_
     assert opening.show_scene(asked, asked.generation, scene).depth == DepthSettings(False)
 
 
-def test_the_same_scene_planned_anew_keeps_its_edits_until_they_are_undone_or_reset() -> None:
+def test_the_same_scene_planned_anew_keeps_its_edits_until_they_are_undone_or_reset():
     edited = gesture.end_gesture(depth.set_tone(opened(), TONE, True))
-    assert edited.scene is not None
     again = replace(edited.scene, plan=plan_of(GRID, scale=0.5))
     state = opening.show_scene(edited, edited.generation, again)
     assert state.depth == edited.depth
     assert history.undo(state).depth == depth.reset(state).depth == DepthSettings()
 
 
-def test_a_map_is_for_the_photo_that_is_open_and_another_photo_keeps_the_choice_of_depth() -> None:
+def test_a_map_is_for_the_photo_that_is_open_and_another_photo_keeps_the_choice_of_depth():
     choice = DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=False)
     source = Source("a.png", choice, grid=GRID, focus_disparity=1.0)
     kept = DepthChoice("model", model="midas", refine=False)
@@ -118,16 +111,14 @@ def test_a_map_is_for_the_photo_that_is_open_and_another_photo_keeps_the_choice_
     given = replace(kept, start="auto", file="b.pfm", stretches=True)
     a_map = do(opening.open_source, replace(source, depth=given, focus_disparity=None))
     for kind, path, action in (("photo", "b.png", photo), ("map", "b.pfm", a_map)):
-        assert action_for_path(kind, path, opened(source)) == action  # type: ignore[arg-type]
+        assert action_for_path(kind, path, opened(source)) == action
         assert actions_from_drop([path], opened(source)) == [action]
 
 
-def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
+def test_the_brush_paints_on_the_surface_seen_under_it():
     state = opened()
-    assert state.scene is not None
     state = lens.move_eye(replace(state, scene=replace(state.scene, width=96, height=64)), GRID.offset(0, 2))
     layout = layout_of((1000, 800), (96, 64))
-    assert layout.picture is not None
     x, y = layout.picture.x + 0.5 * layout.picture.width, layout.picture.y + 0.25 * layout.picture.height
     at = Pointer(x, y, pressed_x=x, pressed_y=y)
     pressed = replace(at, is_down=True, is_pressed=True)
@@ -148,23 +139,21 @@ def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
 
 
 @pytest.mark.parametrize(("given", "proposed"), [("", "_disparity.pfm"), ("a_disparity.pfm", "-edited.pfm")])
-def test_a_map_is_saved_where_it_is_found_again_but_not_over_a_given_one(given: str, proposed: str) -> None:
+def test_a_map_is_saved_where_it_is_found_again_but_not_over_a_given_one(given, proposed):
     state = opened()
-    assert state.scene is not None
     state = replace(state, scene=replace(state.scene, depth_origin=DepthOrigin("file", given) if given else None))
     asked = saving.ask_to_save(state, "map")
-    assert isinstance(asked.prompt, SavePrompt)
     assert asked.prompt.path.endswith(proposed)
 
 
-def test_settings_bring_the_edits_along() -> None:
+def test_settings_bring_the_edits_along():
     edits = replace(TONE, strokes=(STROKE, Stroke("back", ((0.1, 0.2),), 0.03, 0.1, (0.7, 0.2), tolerance=2.0)))
     text = settings_text(settings_of(replace(opened(), depth=DepthSettings(False, edits)), (96, 64)))
     again = settings_from_text(text, "a.png")
     assert (again.depth_edits, again.source.depth.refine) == (edits, False)
 
 
-def test_clips_keep_the_parallax_of_what_they_leave(photo_path: Path) -> None:
+def test_clips_keep_the_parallax_of_what_they_leave(photo_path):
     source = Source(str(photo_path), grid=GRID)
     loaded = load_photo(source)
     clipped = apply_depth_settings(loaded, DepthSettings(edits=DepthEdits(near_clip=0.5)))
@@ -173,7 +162,7 @@ def test_clips_keep_the_parallax_of_what_they_leave(photo_path: Path) -> None:
     assert plans[1].disparity_scale == pytest.approx(plans[0].disparity_scale)
 
 
-def test_refining_is_from_what_was_found_each_time(tmp_path: Path) -> None:
+def test_refining_is_from_what_was_found_each_time(tmp_path):
     path = write_scene(tmp_path)
     soft = blur(np.load(tmp_path / "scene_disparity.npy"), 2.0)
     np.save(tmp_path / "scene_disparity.npy", soft)
@@ -183,7 +172,7 @@ def test_refining_is_from_what_was_found_each_time(tmp_path: Path) -> None:
     np.testing.assert_array_equal(apply_depth_settings(full, DepthSettings(False)).disparity.values, soft)
 
 
-def test_a_flat_photo_can_be_painted_on(tmp_path: Path) -> None:
+def test_a_flat_photo_can_be_painted_on(tmp_path):
     path = write_scene(tmp_path)
     np.save(tmp_path / "scene_disparity.npy", np.zeros((HEIGHT, WIDTH), np.float32))
     edits = DepthEdits(strokes=(replace(STROKE, strength=1.0, radius=0.2),))
@@ -191,7 +180,7 @@ def test_a_flat_photo_can_be_painted_on(tmp_path: Path) -> None:
     assert make_plan(Source(str(path)), painted, 1.0).disparity_range_px[1] > 0
 
 
-def test_the_histogram_turns_with_the_map_follows_strokes_and_marks_the_focus(photo_path: Path) -> None:
+def test_the_histogram_turns_with_the_map_follows_strokes_and_marks_the_focus(photo_path):
     source = Source(str(photo_path), grid=GRID)
     loaded = load_photo(source)
     heights = bar_heights(loaded.levels, False)
@@ -201,7 +190,6 @@ def test_the_histogram_turns_with_the_map_follows_strokes_and_marks_the_focus(ph
     state = state_with(scene_of(GRID, source=source, plan=plan, disparity_range_px=plan.disparity_range_px))
     near = (NEAR - plan.disparity_zero) * plan.disparity_scale
     focused = lens.set_focus(state, near)
-    assert focused.scene is not None
     assert focus_share(focused, focused.scene, loaded.levels) == pytest.approx(1.0)
     pushed = Stroke("back", ((0.5, 0.5),), 0.02, 0.5)
     for is_inverted, place in ((False, 0.5), (True, 1.0)):  # 1.0: values beyond count at the ends
@@ -219,28 +207,25 @@ def test_the_histogram_turns_with_the_map_follows_strokes_and_marks_the_focus(ph
         (0.0, (0.5, 0.5), (2.0, -1.0), 0.0),  # nobody chose a focus, and the click was elsewhere
     ],
 )
-def test_new_depth_keeps_the_focus_where_it_was(
-    focus: float, focused_at: tuple[float, float] | None, in_focus: tuple[float, float] | None, expected: float
-) -> None:
+def test_new_depth_keeps_the_focus_where_it_was(focus, focused_at, in_focus, expected):
     state = replace(opened(), optics=Optics(focus_disparity=focus, focus_range=0.5), focused_at=focused_at)
-    assert state.scene is not None
     deeper = replace(state.scene, plan=plan_of(GRID, scale=2.0), disparity_range_px=(-4.0, 4.0))
     now = opening.show_scene(state, state.generation, deeper, NewDepth(in_focus)).optics
     assert (now.focus_disparity, now.focus_range) == (pytest.approx(expected), pytest.approx(0.8))
 
 
-def test_depth_that_comes_for_the_next_photo_leaves_its_focus() -> None:
+def test_depth_that_comes_for_the_next_photo_leaves_its_focus():
     left = replace(opened(), focused_at=(0.5, 0.5), optics=Optics(focus_disparity=2.0))
     left = replace(left, models=replace(left.models, left_focus=left.optics))
     asked = opening.open_source(left, Source("b.png"))
-    scene = scene_of(GRID, asked.source, plan=plan_of(GRID))  # type: ignore[arg-type]
+    scene = scene_of(GRID, asked.source, plan=plan_of(GRID))
     shown = opening.show_scene(asked, asked.generation, scene)
     new_depth = NewDepth((0.0, 1.5) if shown.focused_at is not None else None)
     deep = opening.show_scene(shown, shown.generation, replace(scene, disparity_range_px=(-4.0, 4.0)), new_depth)
     assert (deep.optics.focus_disparity, deep.chosen_focus) == (0.0, None)
 
 
-def test_drags_add_to_a_selection_and_erase_from_it() -> None:
+def test_drags_add_to_a_selection_and_erase_from_it():
     state = replace(opened(), brush=Brush("select", radius=0.06, feather=0.02, is_on=True))
     assert selection.paint(state, (0.5, 0.5), erases=True, begins=True).selection is None, "nothing to erase from"
     for place, erases, begins in (
@@ -255,7 +240,7 @@ def test_drags_add_to_a_selection_and_erase_from_it() -> None:
     assert stroke == Stroke("back", (selection.NOWHERE,), 0.03, 0.1, patches=(added, erased), feather=0.02)
 
 
-def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> None:
+def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone():
     state = replace(selection.select(opened(), (0.25, 0.75)), brush=Brush("select", tolerance=2.0, is_on=True))
     assert selection.keep_sharp(state) == state, "its depth is not known yet"
     moved = selection.move(state, is_forward=True)
@@ -270,7 +255,7 @@ def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> Non
     assert opening.show_scene(state, 1, scene_of(GRID, source=Source("b.png"))).selection is None
 
 
-def test_a_brush_that_paints_brings_the_depth_overlay_and_takes_it_away() -> None:
+def test_a_brush_that_paints_brings_the_depth_overlay_and_takes_it_away():
     start = replace(opened(), brush=Brush())
     taken = depth.set_brush(start, Brush("nearer", is_on=True))
     assert taken.inspection.overlay == "disparity"

@@ -1,7 +1,5 @@
 """The tilted plane of focus: through both handles, level across them, and clicked things sharp on it."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -28,14 +26,7 @@ disparities = st.floats(-5, 5)
 
 
 @given(places, places, disparities, disparities, st.tuples(disparities, disparities), st.floats(0.1, 3))
-def test_the_plane_runs_through_both_handles_and_is_level_across_them(
-    moved: tuple[float, float],
-    kept: tuple[float, float],
-    there: float,
-    focus: float,
-    tilt: tuple[float, float],
-    aspect: float,
-) -> None:
+def test_the_plane_runs_through_both_handles_and_is_level_across_them(moved, kept, there, focus, tilt, aspect):
     line = moved[0] - kept[0], (moved[1] - kept[1]) * aspect
     assume(math.hypot(*line) >= MIN_HANDLE_DISTANCE)
     before = Optics(focus_disparity=focus, focus_tilt=tilt)
@@ -46,7 +37,7 @@ def test_the_plane_runs_through_both_handles_and_is_level_across_them(
     assert sharp_disparity(after, across) == pytest.approx(sharp_disparity(after, kept), abs=1e-6)
 
 
-def test_handles_on_one_spot_move_the_plane_without_tipping_it() -> None:
+def test_handles_on_one_spot_move_the_plane_without_tipping_it():
     before = Optics(focus_tilt=(0.5, -0.5))
     after = tilt_through(before, (0.2, 0.2), 2.0, (0.2, 0.21), 1.0)
     assert after.focus_tilt == before.focus_tilt
@@ -54,13 +45,13 @@ def test_handles_on_one_spot_move_the_plane_without_tipping_it() -> None:
 
 
 @given(places, disparities)
-def test_what_is_clicked_is_sharp_whatever_the_tilt(place: tuple[float, float], disparity: float) -> None:
+def test_what_is_clicked_is_sharp_whatever_the_tilt(place, disparity):
     after = focus_on(Optics(focus_tilt=(0.7, -0.3), focus_disparity=1), place, disparity)
     assert sharp_disparity(after, place) == pytest.approx(disparity)
     assert after.focus_tilt == (0.7, -0.3)
 
 
-def test_places_of_pixels_and_handles() -> None:
+def test_places_of_pixels_and_handles():
     scene = scene_of(GridShape(3, 3), width=100, height=50)
     assert place_of(-0.5, -0.5, scene) == (-1, -1)
     assert place_of(99.5, 49.5, scene) == (1, 1)

@@ -1,7 +1,5 @@
 """Going from photo to photo in the state: order, ends, what is read ahead, what the filmstrip shows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -18,30 +16,26 @@ from viewer.model.state.app_state import AppState
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 
 
-def state_at(name: str, names: tuple[str, ...] = NAMES) -> AppState:
+def state_at(name, names=NAMES):
     photos = tuple(FolderPhoto(name, float(-i)) for i, name in enumerate(names))
     return reduce(AppState(source=Source(f"/photos/{name}", max_pixels=7)), do(folder.set_photos, "/photos", photos))
 
 
-def open_name(state: AppState) -> str:
-    assert state.source is not None
+def open_name(state):
     return state.source.path.removeprefix("/photos/")
 
 
-def test_numbers_in_names_are_counted_and_times_go_first_where_that_is_wanted() -> None:
+def test_numbers_in_names_are_counted_and_times_go_first_where_that_is_wanted():
     state = state_at("img_9.jpg")
-    assert state.folder is not None
     assert [photo.name for photo in state.folder.photos] == ["img_9.jpg", "IMG_10.jpg", "IMG_11.jpg", "Ä.png"]
     state = reduce(state, do(folder.set_order, "time"))
-    assert state.folder is not None
     assert [photo.name for photo in state.folder.photos] == list(reversed(NAMES))
     assert in_order((), "name") == ()
 
 
-def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends() -> None:
+def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends():
     state = reduce(state_at("img_9.jpg"), do(folder.step, 1))
     assert (open_name(state), state.generation) == ("IMG_10.jpg", 1)
-    assert state.source is not None
     assert state.source.max_pixels == 7
     state = reduce(reduce(state, do(folder.step, 1)), do(folder.step, 1))
     assert open_name(state) == "Ä.png"
@@ -49,7 +43,7 @@ def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends() -
     assert open_name(reduce(state, do(folder.step, -9))) == "img_9.jpg"
 
 
-def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
+def test_steps_do_nothing_where_no_photo_of_the_folder_is_open():
     other = reduce(state_at("img_9.jpg"), do(opening.open_source, Source("/other/a.jpg")))
     other = reduce(other, do(opening.show_scene, other.generation, scene_of(source=other.source)))
     assert other.folder is None, "the filmstrip of another folder goes"
@@ -58,13 +52,12 @@ def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
         assert reduce(state, do(folder.step, 1)) is state
 
 
-def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
+def test_a_walk_through_a_folder_leaves_one_recent_file():
     state = replace(state_at("img_9.jpg"), recent=("/other/a.jpg", "/other/b.jpg"))
     state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg"))))
     state = reduce(state, do(inspection.set_overlay, "disparity"))
     for _ in range(2):
         state = reduce(state, do(folder.step, 1))
-        assert state.source is not None
         state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert state.inspection.overlay == "disparity", "one may look through a folder's depth"
     opened = ("/photos/img_9.jpg", "/other/a.jpg", "/other/b.jpg")
@@ -75,10 +68,10 @@ def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
     assert state.inspection.overlay is None
 
 
-def test_a_photo_that_does_not_open_is_told_once_and_passed_by() -> None:
+def test_a_photo_that_does_not_open_is_told_once_and_passed_by():
     state = state_at("img_9.jpg")
     state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg", max_pixels=7))))
-    damaged = reduce(replace(state, source=state.scene.source), do(folder.step, 1))  # type: ignore[union-attr]
+    damaged = reduce(replace(state, source=state.scene.source), do(folder.step, 1))
     state = reduce(damaged, do(opening.report_failure, damaged.generation, "IMG_10.jpg: damaged"))
     assert open_name(state) == "img_9.jpg"
     assert "damaged" in state.notices[-1].text
@@ -86,10 +79,10 @@ def test_a_photo_that_does_not_open_is_told_once_and_passed_by() -> None:
     assert open_name(state) == "IMG_11.jpg"
     state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert open_name(reduce(state, do(folder.step, -1))) == "img_9.jpg"
-    assert reduce(damaged, do(opening.stop)).folder.unreadable == frozenset()  # type: ignore[union-attr]
+    assert reduce(damaged, do(opening.stop)).folder.unreadable == frozenset()
 
 
-def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:
+def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step():
     state = state_at("IMG_10.jpg")
     assert [source.path[8:] for source in photos_ahead(state, AHEAD)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
     back = reduce(reduce(state, do(folder.step, 1)), do(folder.step, -1))
@@ -109,9 +102,7 @@ def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:
         (3, 99, 99, range(0, 10)),
     ],
 )
-def test_the_filmstrip_shows_what_lies_around_the_open_photo(
-    place: int, scrolled: int, most: int, shown: range
-) -> None:
+def test_the_filmstrip_shows_what_lies_around_the_open_photo(place, scrolled, most, shown):
     names = tuple(f"{i}.jpg" for i in range(10))
     state = reduce(state_at(f"{place}.jpg", names), do(folder.scroll, scrolled))
     assert filmstrip_range(state, most) == shown

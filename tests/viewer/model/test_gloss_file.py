@@ -1,9 +1,5 @@
 """Gloss from TOML files: what they say, and one line for what makes no sense."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
@@ -26,7 +22,7 @@ radius_deg = 1
 """
 
 
-def test_a_file_says_everything(tmp_path: Path) -> None:
+def test_a_file_says_everything(tmp_path):
     path = tmp_path / "gloss.toml"
     path.write_text(WHOLE)
     stroke = GlossStroke(((0.5, 0.5), (0.6, 0.5)), 0.1, erases=True)
@@ -38,7 +34,7 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "gloss"), [("# nothing", Gloss()), ("\ufeffroughness = 0.5", Gloss(roughness=0.5))], ids=["usual", "bom"]
 )
-def test_what_a_file_leaves_out_is_as_usual(tmp_path: Path, text: str, gloss: Gloss) -> None:
+def test_what_a_file_leaves_out_is_as_usual(tmp_path, text, gloss):
     path = tmp_path / "gloss.toml"
     path.write_text(text, "utf-8")
     assert read_gloss(path) == gloss
@@ -67,7 +63,7 @@ def test_what_a_file_leaves_out_is_as_usual(tmp_path: Path, text: str, gloss: Gl
         ("a" * 2_000_000, "is larger than"),
     ],
 )
-def test_what_makes_no_sense_is_named_in_one_line(tmp_path: Path, text: str, named: str) -> None:
+def test_what_makes_no_sense_is_named_in_one_line(tmp_path, text, named):
     path = tmp_path / "gloss.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=named) as refused:

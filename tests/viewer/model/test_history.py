@@ -1,7 +1,5 @@
 """Undo and redo: a drag is one edit, clicks and double clicks are what they look like, other plans keep their units."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,9 +10,8 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import gesture, history, lens, opening
-from viewer.model.action import Action, do
+from viewer.model.action import do
 from viewer.model.presets import active_preset
-from viewer.model.state.app_state import AppState
 
 values = st.floats(0, 3)
 edits = st.one_of(
@@ -23,14 +20,14 @@ edits = st.one_of(
 )
 
 
-def after(state: AppState, *actions: Action) -> AppState:
+def after(state, *actions):
     for action in actions:
         state = reduce(state, action)
     return state
 
 
 @given(st.lists(edits, max_size=12))
-def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted: list[Action]) -> None:
+def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted):
     start = state_with(scene_of())
     state, seen = start, [start.optics]
     for edit in wanted:
@@ -48,7 +45,7 @@ def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted: li
     assert reduce(back, do(history.redo)).optics == state.optics
 
 
-def test_a_drag_is_one_edit_and_another_file_begins_anew() -> None:
+def test_a_drag_is_one_edit_and_another_file_begins_anew():
     start = reduce(state_with(scene_of()), do(lens.set_aperture, 1))
     state = after(
         start,
@@ -68,7 +65,7 @@ def test_a_drag_is_one_edit_and_another_file_begins_anew() -> None:
     assert opened.history.past == ()
 
 
-def test_undoing_depth_strength_makes_the_field_anew() -> None:
+def test_undoing_depth_strength_makes_the_field_anew():
     state = after(
         state_with(scene_of()),
         do(lens.set_depth_strength, 2, False),
@@ -83,7 +80,7 @@ def test_undoing_depth_strength_makes_the_field_anew() -> None:
     assert (redone.depth_strength, redone.generation) == (3, undone.generation + 1)
 
 
-def test_edits_before_another_plan_are_undone_in_its_units() -> None:
+def test_edits_before_another_plan_are_undone_in_its_units():
     old, new = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(9, 9), scale=1.0)
     state = after(
         state_with(scene_of(plan=old)),
@@ -101,7 +98,7 @@ def test_edits_before_another_plan_are_undone_in_its_units() -> None:
     assert reduce(state, do(history.undo)).optics.focus_disparity == pytest.approx(1.0)
 
 
-def test_undoing_depth_strength_brings_the_aperture_and_its_preset_back() -> None:
+def test_undoing_depth_strength_brings_the_aperture_and_its_preset_back():
     """Discs stay as wide as they are, so the aperture follows the depth."""
     few, many = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(13, 13), scale=1.0)
     before = scene_of(plan=few)

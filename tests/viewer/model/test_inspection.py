@@ -1,7 +1,5 @@
 """Inspection as pure functions: verbs, layout beside the picture, words."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +17,7 @@ from viewer.model.commands import BY_NAME
 from viewer.model.inspection import beside_of, sheet_cells, view_at, view_near
 from viewer.model.layout import Beside, layout_of
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Inspection, OverlayKind, Probe
+from viewer.model.state.inspection import Inspection, Probe
 from viewer.model.state.preferences import Preferences
 from viewer.ui.overlays.inspection_overlay import legend_words, status_text
 from viewer.ui.overlays.reticle import hover_text
@@ -31,7 +29,7 @@ FOLDER = replace(SCENE, plan=None)
 OPEN = AppState(source=SCENE.source, scene=SCENE, generation=3)
 
 
-def test_an_overlay_and_a_comparison_take_turns() -> None:
+def test_an_overlay_and_a_comparison_take_turns():
     state = inspection.set_overlay(inspection.compare(OPEN, "photo"), "entropy")
     assert (state.inspection.overlay, state.inspection.comparison) == ("entropy", None)
     state = inspection.compare(state, "photo")
@@ -43,7 +41,7 @@ def test_an_overlay_and_a_comparison_take_turns() -> None:
         assert reduce(shown, BY_NAME[name].action(shown)).inspection == OPEN.inspection
 
 
-def test_opacity_and_divider_are_held_within_the_picture() -> None:
+def test_opacity_and_divider_are_held_within_the_picture():
     assert inspection.set_opacity(OPEN, 3.0).inspection.opacity == 1
     assert 0 < inspection.move_divider(OPEN, -5).inspection.divider < 0.1
     held = inspection.move_divider(OPEN, 5)
@@ -53,7 +51,7 @@ def test_opacity_and_divider_are_held_within_the_picture() -> None:
 
 
 @pytest.mark.parametrize("kind", ["entropy", "inpainted"])
-def test_views_from_disk_have_no_maps_of_how_they_were_made(kind: OverlayKind) -> None:
+def test_views_from_disk_have_no_maps_of_how_they_were_made(kind):
     state = replace(OPEN, scene=FOLDER)
     refused = inspection.set_overlay(state, kind)
     assert refused.inspection == state.inspection
@@ -63,7 +61,7 @@ def test_views_from_disk_have_no_maps_of_how_they_were_made(kind: OverlayKind) -
     assert inspection.set_overlay(flat, "disparity").inspection.overlay is None
 
 
-def test_a_snapshot_is_needed_before_it_is_compared() -> None:
+def test_a_snapshot_is_needed_before_it_is_compared():
     refused = inspection.compare(OPEN, "snapshot")
     assert refused.inspection == OPEN.inspection
     assert [notice.text for notice in refused.notices] == [inspection.NO_SNAPSHOT]
@@ -74,14 +72,14 @@ def test_a_snapshot_is_needed_before_it_is_compared() -> None:
     assert not compared.notices, "the advice was followed"
 
 
-def test_the_next_scene_is_looked_at_in_the_same_way_without_the_findings() -> None:
+def test_the_next_scene_is_looked_at_in_the_same_way_without_the_findings():
     state = inspection.take_snapshot(inspection.show_epis(OPEN, True))
     state = inspection.compare(inspection.set_hover(state, Hover(3, 4, 0.5)), "snapshot")
     opened = reduce(state, do(opening.show_scene, 3, replace(SCENE, source=Source("b.png"))))
     assert opened.inspection == Inspection(shows_epis=True)
 
 
-def test_the_place_pointed_at_last_stays_and_its_values_go() -> None:
+def test_the_place_pointed_at_last_stays_and_its_values_go():
     probe = Probe((1, 2, 3), "photo")
     state = inspection.set_probe(inspection.set_hover(OPEN, Hover(3, 4, 0.5)), probe)
     assert inspection.set_hover(state, Hover(5, 6, 0.5)).inspection.probe == probe, "until the next are known"
@@ -92,19 +90,15 @@ def test_the_place_pointed_at_last_stays_and_its_values_go() -> None:
 @pytest.mark.parametrize(
     ("eye", "view"), [((0, 0), (2, 3)), ((-9, 9), (0, 6)), ((0.6, -1.4), (3, 2)), ((1e30, -1e30), (4, 0))]
 )
-def test_the_view_near_the_eye(eye: tuple[float, float], view: tuple[int, int]) -> None:
+def test_the_view_near_the_eye(eye, view):
     assert view_near(ViewOffset(*eye), GRID) == view
 
 
-def test_strips_take_their_room_beside_the_picture_and_line_up_with_it() -> None:
+def test_strips_take_their_room_beside_the_picture_and_line_up_with_it():
     plain = layout_of((900, 700), (60, 40))
     layout = layout_of((900, 700), (60, 40), 2.0, 1.0, Beside((5, 9), has_status=True))
     picture, across, down, status = layout.picture, layout.strip_across, layout.strip_down, layout.status
     assert plain.strip_across is plain.strip_down is plain.status is None
-    assert picture is not None
-    assert across is not None
-    assert down is not None
-    assert status is not None
     assert picture.width / picture.height == pytest.approx(1.5)
     assert (across.x, across.width) == (picture.x, picture.width)
     assert (down.y, down.height) == (picture.y, picture.height)
@@ -119,14 +113,14 @@ def test_strips_take_their_room_beside_the_picture_and_line_up_with_it() -> None
     assert tiny.picture is tiny.strip_across is tiny.status is None
 
 
-def test_a_single_view_has_no_epis() -> None:
+def test_a_single_view_has_no_epis():
     single = replace(OPEN, scene=replace(SCENE, grid=GridShape(1, 1)))
     assert beside_of(inspection.show_epis(single, True)).epi_views is None
     assert beside_of(inspection.show_epis(OPEN, True)).epi_views == (5, 7)
 
 
 @pytest.mark.parametrize("grid", [GridShape(1, 1), GridShape(3, 9), GridShape(17, 17)])
-def test_a_click_on_the_sheet_finds_the_view_drawn_there(grid: GridShape) -> None:
+def test_a_click_on_the_sheet_finds_the_view_drawn_there(grid):
     picture = Rect(12, 30, 600, 400)
     for i, cell in enumerate(sheet_cells(picture, grid)):
         assert cell.width / cell.height == pytest.approx(1.5)
@@ -136,7 +130,7 @@ def test_a_click_on_the_sheet_finds_the_view_drawn_there(grid: GridShape) -> Non
     assert view_at(picture, grid, 1.0, picture.x, picture.y) is None
 
 
-def test_values_under_the_pointer_in_the_units_of_the_panel() -> None:
+def test_values_under_the_pointer_in_the_units_of_the_panel():
     numbers = replace(OPEN, preferences=Preferences(units="light field"))
     hover, probe = Hover(12.3, 4.0, -0.5), Probe((1, 20, 255), "inpainted")
     assert status_text(OPEN, SCENE, hover, None) == ["12, 4", hover_text(OPEN.optics, SCENE, hover)]
@@ -146,7 +140,7 @@ def test_values_under_the_pointer_in_the_units_of_the_panel() -> None:
     assert status_text(OPEN, SCENE, replace(hover, disparity=None), probe) == ["12, 4", "inpainted", "RGB 1 20 255"]
 
 
-def test_the_legend_speaks_the_units_of_the_panel() -> None:
+def test_the_legend_speaks_the_units_of_the_panel():
     shown, ends = inspection.set_overlay(OPEN, "disparity"), (-1.5, 2.0)
     assert legend_words(shown, SCENE, ends) == ("distance", ["far", "near"])
     numbers = replace(shown, preferences=Preferences(units="light field"))
@@ -156,7 +150,7 @@ def test_the_legend_speaks_the_units_of_the_panel() -> None:
     assert legend_words(inspection.set_overlay(OPEN, "entropy"), SCENE, (0.0, 1.0)) == ("entropy", ["0.00", "1.00"])
 
 
-def test_the_colour_map_grows_steadily_lighter() -> None:
+def test_the_colour_map_grows_steadily_lighter():
     colors = np.array([map_color(share) for share in np.linspace(0, 1, 100)])
     assert (np.diff(colors @ [0.2126, 0.7152, 0.0722]) > 0).all()
     for i, color in enumerate(VIRIDIS):

@@ -1,7 +1,5 @@
 """Relative distance and f-number, against the pinhole camera and the thin lens written out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -10,7 +8,6 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.f_numbers import ASSUMED_DISTANCE_M, equivalent_f_number, f_number
 from iibr_core.scenes.lens_limits import focus_limits
-from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
 from tests.viewer.model.test_opening import plan_of, scene_of
 from viewer.model.state.app_state import Hover
@@ -29,14 +26,14 @@ from viewer.ui.overlays.reticle import hover_text
 FOCAL_PX, STEP_M = 1000.0, 0.01
 
 
-def scene_at(still_m: float, scale: float = 0.5) -> Scene:
+def scene_at(still_m, scale=0.5):
     """A camera that steps by STEP_M from view to view of the given disparity; still_m: what does not move."""
     plan = plan_of(GridShape(9, 9), scale=scale, zero=FOCAL_PX * STEP_M / still_m)
     return scene_of(plan=plan, focal_px=FOCAL_PX, width=1000, height=700, disparity_range_px=(-1.0, 1.0))
 
 
 @pytest.mark.parametrize("distance_m", [1.0, 2.0, 7.5])
-def test_distance_follows_from_disparity_as_in_a_pinhole_camera(distance_m: float) -> None:
+def test_distance_follows_from_disparity_as_in_a_pinhole_camera(distance_m):
     scene = scene_at(still_m=4.0)
     given = FOCAL_PX * STEP_M / distance_m
     field = (given - FOCAL_PX * STEP_M / 4.0) * 0.5
@@ -44,12 +41,11 @@ def test_distance_follows_from_disparity_as_in_a_pinhole_camera(distance_m: floa
     assert disparity_at(scene, distance_m / 4.0) == pytest.approx(field)
 
 
-def test_the_f_number_gives_the_blur_of_a_thin_lens() -> None:
+def test_the_f_number_gives_the_blur_of_a_thin_lens():
     """Of a point at infinity while the still plane is sharp: aperture / focal distance, in focal lengths."""
     scene = scene_at(still_m=ASSUMED_DISTANCE_M)
     diameter = 3.0
     stop = f_number(scene, diameter)
-    assert stop is not None
     focal_m = FOCAL_PX / 1000 * 0.036
     aperture_m = focal_m / stop
     blur_px = aperture_m / ASSUMED_DISTANCE_M * FOCAL_PX
@@ -71,26 +67,25 @@ def test_the_f_number_gives_the_blur_of_a_thin_lens() -> None:
         scene_of(plan=plan_of(GridShape(1, 1), scale=0.0), focal_px=FOCAL_PX),
     ],
 )
-def test_nothing_is_said_where_nothing_is_known(scene: Scene) -> None:
+def test_nothing_is_said_where_nothing_is_known(scene):
     assert f_number(scene, 2.0) is None
     assert relative_distance(scene, 1.0) is None
     assert disparity_at(scene, 1.0) is None
     assert distance_limits(scene) is None
 
 
-def test_the_equivalent_is_the_f_number_of_a_portrait_lens_that_blurs_alike() -> None:
+def test_the_equivalent_is_the_f_number_of_a_portrait_lens_that_blurs_alike():
     """With the nearest surface in focus at the assumed distance and the farthest at infinity; blur goes with the square
     of the focal length.
     """
     field_at_infinity = (0 - FOCAL_PX * STEP_M / ASSUMED_DISTANCE_M) * 0.5
     scene = replace(scene_at(still_m=ASSUMED_DISTANCE_M), disparity_range_px=(field_at_infinity, 0.0))
     stop = f_number(scene, 3.0)
-    assert stop is not None
     assert equivalent_f_number(scene, 3.0) == pytest.approx(stop * (85 / 36) ** 2)
 
 
 @pytest.mark.parametrize("scene", [scene_of(), scene_of(focal_px=80.0), scene_of(plan=plan_of(GridShape(9, 9)))])
-def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene: Scene) -> None:
+def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene):
     assert f_number_text(scene, 0.0) == "pinhole"
     stops = [equivalent_f_number(scene, diameter) or 0.0 for diameter in (1.0, 2.0, 4.0)]
     assert stops[0] == pytest.approx(2 * stops[1]) == pytest.approx(4 * stops[2])
@@ -99,12 +94,12 @@ def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene: Sce
     assert f_number_text(scene_at(still_m=2.0), 2.0).startswith("f/")
 
 
-def test_the_f_number_waits_for_the_depth_that_it_follows_from() -> None:
+def test_the_f_number_waits_for_the_depth_that_it_follows_from():
     for early in (scene_of(has_view_disparity=False), scene_of(is_sketch=True)):
         assert (f_number_text(early, 2.0), f_number_text(early, 0.0)) == ("f/…", "pinhole")
 
 
-def test_metres_follow_from_the_disparity_that_metric_depth_became() -> None:
+def test_metres_follow_from_the_disparity_that_metric_depth_became():
     scene = replace(scene_of(plan=plan_of(GridShape(9, 9), scale=0.5, zero=2.0)), inverse_metres=(0.1, 0.05))
     assert metres(scene, 1.0) == pytest.approx(1 / (0.1 * (1.0 / 0.5 + 2.0) + 0.05))
     assert metres(scene, -99.0) == math.inf
@@ -112,7 +107,7 @@ def test_metres_follow_from_the_disparity_that_metric_depth_became() -> None:
     assert [metres_text(m) for m in (0.421, 12.3, math.inf)] == ["0.42 m", "12 m", "∞"]
 
 
-def test_near_is_0_far_is_100_and_back() -> None:
+def test_near_is_0_far_is_100_and_back():
     scene = scene_of()
     low, high = focus_limits(scene)
     assert (far_percent(scene, high), far_percent(scene, low)) == (0.0, 100.0)
@@ -131,9 +126,7 @@ def test_near_is_0_far_is_100_and_back() -> None:
         (-2.0, (0.25, 0.5), "∞  ·  far behind"),
     ],
 )
-def test_the_pointer_says_how_far_before_or_behind_the_focus_things_are(
-    disparity: float, inverse_metres: tuple[float, float] | None, words: str
-) -> None:
+def test_the_pointer_says_how_far_before_or_behind_the_focus_things_are(disparity, inverse_metres, words):
     scene = scene_of(plan=plan_of(GridShape(9, 9)), inverse_metres=inverse_metres)
     assert hover_text(Optics(), scene, Hover(30.0, 20.0, disparity)) == words
     in_pixels = f"{abs(disparity):.2f} px"

@@ -1,7 +1,5 @@
 """The core names no options; the command line and the window word its remedies themselves."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from pathlib import Path
@@ -18,14 +16,14 @@ from viewer.model import remedies as window
 from viewer.model.commands import BY_NAME
 
 
-def test_no_text_of_the_core_names_an_option_or_a_command() -> None:
+def test_no_text_of_the_core_names_an_option_or_a_command():
     texts = [text for path in Path(iibr_core.__file__).parent.rglob("*.py") for _, text in texts_of(path)]
     assert len(texts) > 300
     assert not [text for text in texts if re.search(r"(^| )--[a-z]|`iibr ", text)]
 
 
 @pytest.mark.parametrize("remedy", Remedy)
-def test_each_interface_words_each_remedy(remedy: Remedy) -> None:
+def test_each_interface_words_each_remedy(remedy):
     error = FixableError("a.png: is bad", remedy)
     assert command_line.words_of(error).startswith("a.png: is bad; ")
     assert command_line.words_of(error) != window.words_of(error)
@@ -35,11 +33,11 @@ def test_each_interface_words_each_remedy(remedy: Remedy) -> None:
     assert remedy_of(pickle.loads(pickle.dumps(error))) is remedy, "workers are other processes"
 
 
-def test_what_does_not_fit_can_be_made_smaller() -> None:
+def test_what_does_not_fit_can_be_made_smaller():
     with pytest.raises(FixableError, match=r"17 x 17 views of a\.jpg takes") as error:
         require_memory(2**60, "17 x 17 views of a.jpg")
     assert error.value.remedy is Remedy.SMALLER
 
 
-def test_buttons_for_better_depth_are_commands() -> None:
+def test_buttons_for_better_depth_are_commands():
     assert set(window.DEPTH_COMMANDS) <= BY_NAME.keys()

@@ -1,11 +1,7 @@
 """Settings in a saved picture: round trips, and texts that are damaged, foreign or hostile."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -56,12 +52,12 @@ ONE = SavedSettings(Optics(eye=ViewOffset(1, 2)), 1.5, Source("", grid=GridShape
 
 
 @given(settings)
-def test_text_and_back_is_exact(saved: SavedSettings) -> None:
+def test_text_and_back_is_exact(saved):
     assert settings_from_text(settings_text(saved), "a.png") == saved
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr"])
-def test_a_picture_carries_its_settings(tmp_path: Path, suffix: str) -> None:
+def test_a_picture_carries_its_settings(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     mask = ApertureMask("stär.png", 64, 64, bytes(range(256)) * 16)
     saved = SavedSettings(Optics(aperture_shape=ApertureShape("mask", mask=mask)), 1.0, Source(""), (8, 6))
@@ -69,13 +65,13 @@ def test_a_picture_carries_its_settings(tmp_path: Path, suffix: str) -> None:
     assert read_settings(path) == saved
 
 
-def test_no_path_of_the_users_goes_into_a_picture() -> None:
+def test_no_path_of_the_users_goes_into_a_picture():
     depth = DepthChoice(file="/home/somebody/a.pfm", model="/home/somebody/model")
     text = settings_text(SavedSettings(Optics(), 1.0, Source("/home/somebody/a.png", depth), (1, 1)))
     assert "somebody" not in text
 
 
-def changed(**changes: Any) -> str:
+def changed(**changes):
     """The text of ONE with some values replaced: keys are dotted paths with underscores doubled to dots."""
     whole = json.loads(settings_text(ONE))
     for name, value in changes.items():
@@ -112,7 +108,7 @@ def changed(**changes: Any) -> str:
     ],
     ids=range(19),
 )
-def test_damaged_settings_are_one_line_that_names_the_field(text: str, named: str) -> None:
+def test_damaged_settings_are_one_line_that_names_the_field(text, named):
     with pytest.raises(InputError, match=r"^a\.png: ") as error:
         settings_from_text(text, "a.png")
     assert named in str(error.value)
@@ -156,7 +152,7 @@ SAVED = SavedSettings(
 STROKE = Stroke("nearer", ((0.5, 0.25), (0.75, 0.25)), 0.03, 0.25)
 
 
-def test_texts_written_before_are_read() -> None:
+def test_texts_written_before_are_read():
     assert settings_from_text(FIRST_TEXT, "a.png") == SAVED
     edits = DepthEdits(is_inverted=True, far_clip=0.125, gamma=2.0, strokes=(STROKE,))
     later = replace(SAVED, depth_edits=edits)
@@ -164,23 +160,22 @@ def test_texts_written_before_are_read() -> None:
 
 
 @pytest.mark.parametrize(("text", "is_on"), [("0", False), ("0.35", True)])
-def test_a_strength_of_refinement_is_read_as_a_switch(text: str, is_on: bool) -> None:
+def test_a_strength_of_refinement_is_read_as_a_switch(text, is_on):
     saved = settings_from_text(LATER_TEXT.replace('"refine":0.5', f'"refine":{text}'), "a.png")
     assert saved.source.depth.refine is is_on
 
 
-def test_numbers_of_numpy_are_written_like_any() -> None:
+def test_numbers_of_numpy_are_written_like_any():
     plain, numpy = (replace(SAVED, optics=Optics(focus_disparity=kind(0.1))) for kind in (float, np.float64))
     assert settings_text(numpy) == settings_text(plain)
 
 
-def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
+def test_what_a_later_program_added_is_named_and_the_rest_counts():
     strokes = [{"tool": "nearer", "points": [[0.5, 0.25]], "radius": 0.03, "strength": 0.25, "tilt_deg": 5}]
     text = changed(film="grain", optics__bokeh={"deep": [1]}, depth_edits={"strokes": strokes}, source__a="\n" * 90)
     state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(settings=text)))
     (notice,) = state.notices
     assert not notice.is_error
-    assert notice.offer is not None
     assert notice.offer.unknown_fields == ("optics.bokeh", "source.a", "film", "depth_edits.strokes.tilt_deg")
     assert replace(notice.offer, unknown_fields=(), depth_edits=ONE.depth_edits) == ONE
     assert "optics.bokeh, source.a, film and 1 more" in notice.text
@@ -190,7 +185,7 @@ def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
 @pytest.mark.parametrize(
     ("name", "reason"), [("plain.png", "no settings"), ("text.png", "not a picture"), ("gone.png", "no such file")]
 )
-def test_pictures_without_settings_and_other_files(tmp_path: Path, name: str, reason: str) -> None:
+def test_pictures_without_settings_and_other_files(tmp_path, name, reason):
     write_image(tmp_path / "plain.png", np.zeros((4, 4, 3), np.uint8))
     (tmp_path / "text.png").write_text("this is no picture")
     with pytest.raises(InputError, match=reason) as error:
@@ -198,7 +193,7 @@ def test_pictures_without_settings_and_other_files(tmp_path: Path, name: str, re
     assert name in str(error.value)
 
 
-def test_strokes_are_limited_only_in_files_from_elsewhere() -> None:
+def test_strokes_are_limited_only_in_files_from_elsewhere():
     strokes = tuple(Stroke(BRUSH_TOOLS[k % 3], ((0.5, 0.5),), 0.03, 0.25) for k in range(2000))
     saved, longer = (replace(SAVED, depth_edits=DepthEdits(strokes=strokes * count)) for count in (1, 6))
     assert settings_from_text(settings_text(saved), "a.png") == saved
@@ -207,14 +202,14 @@ def test_strokes_are_limited_only_in_files_from_elsewhere() -> None:
     assert settings_from_text(settings_text(longer), "a.png", is_own=True) == longer
 
 
-def test_limits_of_the_machine_in_old_texts_are_left_out_without_a_word() -> None:
+def test_limits_of_the_machine_in_old_texts_are_left_out_without_a_word():
     saved = settings_from_text(changed(source__max_pixels=2**70, source__memory_bytes="all"), "a.png")
     assert saved == ONE
     assert left_out_note(saved) == ""
     assert source_like(Source("photo.png", max_pixels=10_000), saved, ()).max_pixels == 10_000
 
 
-def test_what_gloss_no_longer_has_is_named_only_where_it_was_used() -> None:
+def test_what_gloss_no_longer_has_is_named_only_where_it_was_used():
     used = settings_from_text(changed(optics__gloss={"environment": "/etc/passwd", "photo_shines": True}), "a.png")
     assert used.optics.gloss == Gloss()
     assert "optics.gloss.environment, optics.gloss.photo_shines" in left_out_note(used)
@@ -222,7 +217,7 @@ def test_what_gloss_no_longer_has_is_named_only_where_it_was_used() -> None:
     assert left_out_note(unused) == ""
 
 
-def test_options_given_beat_the_saved_ones() -> None:
+def test_options_given_beat_the_saved_ones():
     source = Source("photo.png", DepthChoice("model", "map.pfm", 2.0), GridShape(9, 9))
     merged = source_like(source, ONE, given={"grid"})
     assert merged == Source("photo.png", DepthChoice("model", "map.pfm"), GridShape(9, 9))

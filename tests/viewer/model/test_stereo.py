@@ -1,7 +1,5 @@
 """The stereo picture: viewpoints of the eyes, parallax on the screen, arrangements, and the choice of a monitor."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -10,21 +8,21 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.lenticular import Calibration, parse_calibration
+from iibr_core.formats.lenticular import parse_calibration
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import stereo
 from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES, Monitor, Stereo, StereoMode
+from viewer.model.state.stereo import STEREO_MODES, Monitor, Stereo
 
 SCENE = Scene(Source("a.png"), "a", 600, 400, GridShape(3, 9), (-2.0, 4.0), "a.pfm")
 PANEL, TELEVISION = Monitor("eDP-1", 0, 0, 1920, 1080), Monitor("HDMI-1", 1920, 0, 3840, 2160)
 STATE = AppState(scene=SCENE, monitors=(PANEL, TELEVISION))
 
 
-def test_the_eyes_see_what_an_export_of_both_shows() -> None:
+def test_the_eyes_see_what_an_export_of_both_shows():
     chosen = Stereo(eyes=3.0, screen=1.5)
     eyes = stereo.eyes_at(SCENE, Optics(aperture_diameter=2.0), chosen)
     wanted = side_pictures(SCENE, RenderSettings(Optics(focus_disparity=1.5), ScreenSize(60, 40)), 2, 3.0)
@@ -36,7 +34,7 @@ def test_the_eyes_see_what_an_export_of_both_shows() -> None:
 
 @pytest.mark.parametrize("count", [2, 45])
 @pytest.mark.parametrize("at", [-4.0, 0.3, 3.9, 99.0])
-def test_all_eyes_stay_within_the_views_and_the_picture(at: float, count: int) -> None:
+def test_all_eyes_stay_within_the_views_and_the_picture(at, count):
     eyes = stereo.eyes_at(SCENE, Optics(eye=ViewOffset(0.5, at)), Stereo(eyes=2.0, screen=4.0), count)
     places = [eye.optics.eye.s for eye in eyes]
     assert len(places) == count
@@ -51,7 +49,7 @@ def test_all_eyes_stay_within_the_views_and_the_picture(at: float, count: int) -
     }
 
 
-def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of() -> None:
+def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of():
     usual = Stereo()
     assert stereo.eye_distance(SCENE, usual) == pytest.approx(0.03 * 600 / 4)
     assert stereo.warning(SCENE, usual) == ""
@@ -67,7 +65,7 @@ def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of() -> None:
 
 @pytest.mark.parametrize("mode", STEREO_MODES)
 @pytest.mark.parametrize("size", [ScreenSize(1920, 1080), ScreenSize(641, 3), ScreenSize(1, 1)])
-def test_pictures_fit_their_rooms_and_places_lead_back(mode: StereoMode, size: ScreenSize) -> None:
+def test_pictures_fit_their_rooms_and_places_lead_back(mode, size):
     state = stereo.set_mode(STATE, mode)
     weave = stereo.weave_of(state, SCENE, size)
     assert all(1 <= inner <= room <= whole for inner, room, whole in zip(weave.eyes[0].size_px, weave.frame_px, size))
@@ -77,7 +75,7 @@ def test_pictures_fit_their_rooms_and_places_lead_back(mode: StereoMode, size: S
     assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0), abs=1e-9)
 
 
-def test_the_picture_goes_to_the_chosen_monitor_else_to_the_second_else_to_the_window() -> None:
+def test_the_picture_goes_to_the_chosen_monitor_else_to_the_second_else_to_the_window():
     assert stereo.show(STATE, True).stereo.monitor == TELEVISION
     alone = stereo.show(replace(STATE, monitors=(PANEL,), hides_panel=False), True)
     assert alone.stereo.is_shown
@@ -95,7 +93,7 @@ def test_the_picture_goes_to_the_chosen_monitor_else_to_the_second_else_to_the_w
     assert stereo.show(replace(STATE, monitors=()), True).stereo.monitor is None
 
 
-def test_a_monitor_that_moves_is_followed_and_one_that_goes_closes_the_picture() -> None:
+def test_a_monitor_that_moves_is_followed_and_one_that_goes_closes_the_picture():
     shown, moved = stereo.show(STATE, True), replace(TELEVISION, x=1024)
     assert stereo.set_monitors(shown, (PANEL, moved)).stereo.monitor == moved
     gone = stereo.set_monitors(shown, (PANEL,))
@@ -103,20 +101,20 @@ def test_a_monitor_that_moves_is_followed_and_one_that_goes_closes_the_picture()
     assert "HDMI-1" in gone.notices[-1].text
 
 
-def test_the_command_and_escape_close_it() -> None:
+def test_the_command_and_escape_close_it():
     shown, closed = stereo.show(STATE, True), stereo.show(stereo.show(STATE, True), False)
     for keys in (Keys(is_escape=True), Keys(commands=("Stereo display",))):
         (action,) = actions_from_keys(keys, shown)
         assert action.apply(shown) == closed
 
 
-def lenticular(width: int, height: int) -> Calibration:
+def lenticular(width, height):
     """The calibration of a display with a screen of this size."""
     stated = {"pitch": 50, "slope": -7, "center": 0.5, "DPI": 300, "screenW": width, "screenH": height}
     return parse_calibration(json.dumps(stated), "a display")
 
 
-def test_a_lenticular_display_gets_all_views_on_its_own_monitor() -> None:
+def test_a_lenticular_display_gets_all_views_on_its_own_monitor():
     display, twin = lenticular(1440, 2560), Monitor("DP-3", 9000, 0, 1440, 2560)
     state = replace(STATE, monitors=(*STATE.monitors, replace(twin, name="DP-2", x=5760), twin))
     assert stereo.show_on(state, display).stereo.monitor == state.monitors[2], "the first of its size"
@@ -132,7 +130,7 @@ def test_a_lenticular_display_gets_all_views_on_its_own_monitor() -> None:
     assert stereo.set_mode(shown, "rows").stereo.display is None
 
 
-def test_a_monitor_of_another_size_is_named() -> None:
+def test_a_monitor_of_another_size_is_named():
     shown = stereo.show_on(STATE, lenticular(1536, 2048))
     assert shown.stereo.monitor == TELEVISION
     assert "screen of 1536x2048, not of HDMI-1, 3840 x 2160" in stereo.warning(SCENE, shown.stereo)

@@ -1,11 +1,8 @@
 """A head that moves the viewpoint: packets, directions, ends, the filter, and what a hand does meanwhile."""
 
-from __future__ import annotations
-
 import math
 import struct
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +16,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_opening import grids, scene_of, state_with
 from viewer.model import gesture, history, lens, opening, tracking, viewpoint
-from viewer.model.action import Action, do
+from viewer.model.action import do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.viewpoint import FreeCamera
 from viewer.model.tracking import HEAD_RANGE_LIMITS, address_of, eye_of, head_in, offset_of, smooth
@@ -27,18 +24,18 @@ from viewer.model.tracking import HEAD_RANGE_LIMITS, address_of, eye_of, head_in
 FIVE = scene_of(GridShape(5, 5))
 
 
-def followed(state: AppState, *heads: complex) -> AppState:
+def followed(state, *heads):
     for head in heads:
         state = tracking.follow(state, head, 5.0)
     return state
 
 
-def tracked(*heads: complex) -> AppState:
+def tracked(*heads):
     """Return the state after places of the head, the first of which is the centre."""
     return followed(tracking.switch(state_with(FIVE), "udp"), *heads)
 
 
-def pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -> bytes:
+def pose(x=0.0, y=0.0, yaw=0.0, pitch=0.0):
     return struct.pack("<6d", x, y, 60.0, yaw, pitch, 3.0)
 
 
@@ -55,9 +52,8 @@ def pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -
         (pose(x=-1000, y=-1000), ViewOffset(2, 2)),
     ],
 )
-def test_the_viewpoint_goes_where_the_head_goes(packet: bytes, eye: ViewOffset) -> None:
+def test_the_viewpoint_goes_where_the_head_goes(packet, eye):
     head = head_in(packet)
-    assert head is not None
     assert tracked(0j, head).optics.eye == pytest.approx(eye)
 
 
@@ -71,17 +67,17 @@ def test_the_viewpoint_goes_where_the_head_goes(packet: bytes, eye: ViewOffset) 
         *(pose(x=number) for number in (math.nan, math.inf, -math.inf, 1e300)),
     ],
 )
-def test_packets_that_are_no_poses_are_dropped(packet: bytes) -> None:
+def test_packets_that_are_no_poses_are_dropped(packet):
     assert head_in(packet) is None
 
 
 @given(st.binary(min_size=48, max_size=48))
-def test_every_place_of_the_head_is_finite(packet: bytes) -> None:
+def test_every_place_of_the_head_is_finite(packet):
     head = head_in(packet)
     assert head is None or abs(head) <= math.hypot(1000, 1000)
 
 
-def test_the_viewpoint_slows_down_towards_the_outermost_views_and_stays_there() -> None:
+def test_the_viewpoint_slows_down_towards_the_outermost_views_and_stays_there():
     eyes = [tracked(0j, complex(cm)).optics.eye.s for cm in range(0, 40)]
     steps = np.diff(eyes)
     assert np.all(np.diff(steps) <= 1e-12)
@@ -89,16 +85,14 @@ def test_the_viewpoint_slows_down_towards_the_outermost_views_and_stays_there() 
 
 
 @given(grids, st.floats(*HEAD_RANGE_LIMITS), st.floats(0.25, 4), st.complex_numbers(max_magnitude=1000))
-def test_any_viewpoint_has_its_place_of_the_head(
-    grid: GridShape, range_cm: float, row_step: float, cm: complex
-) -> None:
+def test_any_viewpoint_has_its_place_of_the_head(grid, range_cm, row_step, cm):
     scene = scene_of(grid, row_step=row_step)
     eye = eye_of(cm, range_cm, scene)
     assert eye == clamp_eye(eye, grid)
     assert eye_of(offset_of(eye, range_cm, scene), range_cm, scene) == pytest.approx(eye, abs=1e-6)
 
 
-def test_a_centimetre_is_as_long_across_as_down() -> None:
+def test_a_centimetre_is_as_long_across_as_down():
     scene = scene_of(GridShape(3, 9), row_step=0.5)
     eye = eye_of(0.1 + 0.1j, 15, scene)
     assert scene.in_columns(eye).t == pytest.approx(eye.s, rel=1e-2)
@@ -109,7 +103,7 @@ def test_a_centimetre_is_as_long_across_as_down() -> None:
 
 
 @pytest.mark.parametrize(("rate_hz", "factor"), [(30, 2.5), (60, 3.5), (250, 6)])
-def test_noise_of_a_millimetre_is_reduced(rate_hz: int, factor: float) -> None:
+def test_noise_of_a_millimetre_is_reduced(rate_hz, factor):
     rng = np.random.default_rng(0)
     noise = rng.normal(0, 0.1, (rate_hz * 20, 2)) @ (1, 1j)
     smoothed, places = None, []
@@ -121,16 +115,15 @@ def test_noise_of_a_millimetre_is_reduced(rate_hz: int, factor: float) -> None:
 
 @pytest.mark.parametrize("rate_hz", [30, 60, 250])
 @pytest.mark.parametrize("speed_cm", [5, 20, 100])
-def test_a_moving_head_lags_little(rate_hz: int, speed_cm: float) -> None:
+def test_a_moving_head_lags_little(rate_hz, speed_cm):
     smoothed = None
     for i in range(rate_hz):
         smoothed = smooth(smoothed, complex(speed_cm * i / rate_hz, 0), i / rate_hz)
-    assert smoothed is not None
     lag_cm = speed_cm * (rate_hz - 1) / rate_hz - smoothed.place.real
     assert 0 <= lag_cm < 0.35
 
 
-def test_the_filter_starts_again_after_a_pause_and_takes_packets_of_one_moment() -> None:
+def test_the_filter_starts_again_after_a_pause_and_takes_packets_of_one_moment():
     first = smooth(None, 1j, 10.0)
     assert smooth(first, 5j, 10.0) == first
     assert smooth(first, 5j, 9.0) == first
@@ -141,13 +134,13 @@ def test_the_filter_starts_again_after_a_pause_and_takes_packets_of_one_moment()
 # The hand
 
 
-def test_the_first_place_of_the_head_is_the_centre() -> None:
+def test_the_first_place_of_the_head_is_the_centre():
     state = replace(tracking.switch(state_with(FIVE), "udp"), optics=replace(AppState().optics, eye=ViewOffset(1, -1)))
     assert followed(state, 40 - 9j).optics.eye == pytest.approx((1, -1))
     assert followed(state, 40 - 9j, 55 - 9j).optics.eye.s > 0
 
 
-def test_a_drag_moves_the_centre_and_the_head_goes_on_from_there() -> None:
+def test_a_drag_moves_the_centre_and_the_head_goes_on_from_there():
     state = lens.move_eye(tracked(0j, 6 + 0j), ViewOffset(1, -1))
     state = followed(state, 6 + 0j)
     assert state.optics.eye == pytest.approx((1, -1))
@@ -155,27 +148,25 @@ def test_a_drag_moves_the_centre_and_the_head_goes_on_from_there() -> None:
     assert followed(state, 30 + 0j, 6 + 0j).optics.eye == pytest.approx((1, -1))
 
 
-def test_home_makes_the_present_place_the_centre() -> None:
+def test_home_makes_the_present_place_the_centre():
     state = viewpoint.return_home(tracked(0j, 6 + 3j))
     for i in range(12):
         state = followed(viewpoint.tick(state, i / 20), 6 + 3j)
     assert not state.motion.is_running
     assert state.optics.eye == pytest.approx(CENTRE)
-    assert state.tracking is not None
     assert state.tracking.centre == pytest.approx(6 + 3j)
 
 
-def test_undo_of_a_focus_does_not_move_the_centre() -> None:
+def test_undo_of_a_focus_does_not_move_the_centre():
     state = lens.set_focus(gesture.end_gesture(tracked(0j, 3 + 0j)), 0.5)
     state = followed(history.undo(followed(state, 9 + 0j)), 9 + 0j)
     assert state.optics.focus_disparity == 0
     assert state.optics.eye == tracked(0j, 9 + 0j).optics.eye
 
 
-def test_another_photo_keeps_the_centre() -> None:
+def test_another_photo_keeps_the_centre():
     state = followed(lens.move_eye(tracked(0j, 3 + 0j), CENTRE), 9 + 0j)
     opened = opening.open_source(state, Source("other.png"))
-    assert opened.source is not None
     shown = opening.show_scene(opened, opened.generation, scene_of(GridShape(5, 5), opened.source))
     assert shown.optics.eye == CENTRE
     assert followed(shown, 9 + 0j).optics.eye == state.optics.eye != CENTRE
@@ -189,7 +180,7 @@ def test_another_photo_keeps_the_centre() -> None:
         {"scene": None},
     ],
 )
-def test_the_viewpoint_holds_while_something_else_needs_it(changes: dict[str, Any]) -> None:
+def test_the_viewpoint_holds_while_something_else_needs_it(changes):
     state = tracked(0j, 3 + 0j)
     held = followed(replace(state, **changes), 9 + 0j)
     assert held.optics == state.optics
@@ -197,27 +188,27 @@ def test_the_viewpoint_holds_while_something_else_needs_it(changes: dict[str, An
     assert again.optics.eye == tracked(0j, 9 + 0j).optics.eye
 
 
-def test_a_loop_goes_on_and_a_rack_leaves_the_viewpoint_to_the_head() -> None:
+def test_a_loop_goes_on_and_a_rack_leaves_the_viewpoint_to_the_head():
     looping = viewpoint.set_loop(tracked(0j), "circle")
     assert followed(looping, 9 + 0j).optics.eye == CENTRE
     racked = replace(tracked(0j), chosen_focus=1.0, focus_before=0.0)
     assert followed(viewpoint.rack_focus(racked), 9 + 0j).optics.eye.s > 0
 
 
-def test_following_is_no_edit_and_keeps_the_comparison_with_the_photo() -> None:
+def test_following_is_no_edit_and_keeps_the_comparison_with_the_photo():
     state = followed(lens.show_before(tracked(0j), True), 9 + 0j)
     assert state.shows_before
     assert not state.history.past
 
 
-def test_a_state_without_a_tracker_ignores_the_head() -> None:
+def test_a_state_without_a_tracker_ignores_the_head():
     state = state_with(FIVE)
-    actions: list[Action] = [do(tracking.follow, 3 + 0j, 1.0), do(tracking.set_receiving, True)]
+    actions = [do(tracking.follow, 3 + 0j, 1.0), do(tracking.set_receiving, True)]
     assert [action.apply(state) for action in actions] == [state, state]
 
 
 @pytest.mark.parametrize(("wanted", "got"), [(1.0, 3.0), (25.0, 25.0), (1e9, 60.0), (math.nan, 3.0)])
-def test_the_movement_is_limited(wanted: float, got: float) -> None:
+def test_the_movement_is_limited(wanted, got):
     assert tracking.set_head_range(tracked(), wanted).preferences.head_range_cm == got
 
 
@@ -230,13 +221,13 @@ def test_the_movement_is_limited(wanted: float, got: float) -> None:
         ("udp:localhost:65535", ("localhost", 65535)),
     ],
 )
-def test_addresses(text: str, place: tuple[str, int]) -> None:
+def test_addresses(text, place):
     assert address_of(text) == place
 
 
 @pytest.mark.parametrize(
     "text", ["", "tcp:4242", "udp:", "udp:0", "udp:65536", "udp:host:x", "udp:4242:4242:1", "4242"]
 )
-def test_other_addresses_are_refused(text: str) -> None:
+def test_other_addresses_are_refused(text):
     with pytest.raises(InputError, match=r"is no tracker: give udp:PORT or udp:HOST:PORT"):
         address_of(text)

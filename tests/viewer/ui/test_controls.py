@@ -6,14 +6,17 @@ from operator import attrgetter
 import pytest
 
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.exports.kinds import ExportOptions
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
-from viewer.model import depth, inspection, lens, viewpoint
+from viewer.model import depth, inspection, lens, messages, viewpoint
 from viewer.model.action import do
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.state.preferences import Preferences, with_sections
+from viewer.model.state.prompts import ExportPrompt, SavePrompt
 
 NINE = GridShape(9, 9)
 SCENE = scene_of(NINE, plan=plan_of(NINE), focal_px=50.0)
@@ -139,3 +142,28 @@ def test_a_button_or_box_does_what_it_says(operated, row):
     section, actions, widget, part, value = row
     after = operated(state_of(section, *actions), **{widget: True})
     assert attrgetter(part)(after) == value
+
+
+@pytest.mark.parametrize(
+    ("kind", "widget", "given", "option", "value"),
+    [
+        ("gif", "##seconds", 2.0, "frames", 30),
+        ("gif", "##rate", 10.0, "frames", 20),
+        ("gif", "##width", 48, "size", ScreenSize(48, 32)),
+        ("focal-stack", "##frames", 7, "frames", 7),
+        ("web", "##budget", 2.5, "budget", 2_500_000),
+    ],
+)
+def test_an_option_of_an_export_is_set_in_its_unit(operated, kind, widget, given, option, value):
+    asked = do(
+        messages.show_prompt,
+        ExportPrompt(kind, "a", ExportOptions(frames=30, rate=15.0) if kind == "gif" else ExportOptions()),
+    )
+    assert getattr(operated(state_of("more", asked), **{widget: given}).prompt.options, option) == value
+
+
+def test_a_picture_that_is_saved_keeps_its_shape(operated):
+    asked = do(messages.show_prompt, SavePrompt("a.jpg", ScreenSize(60, 40)))
+    assert operated(state_of("more", asked), **{"##width": 90}).prompt.size_px == (90, 60)
+    assert operated(state_of("more", asked), **{"##Quality": 50.0}).prompt.form.quality == 50
+    assert operated(state_of("more", asked), **{"keep GPS data": True}).prompt.form.keeps_position

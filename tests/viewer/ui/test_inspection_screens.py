@@ -7,12 +7,11 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.depth.editing.edits import Stroke
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, NEAR, WIDTH
-from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import MASK_COLORS
-from viewer.model import depth, inspection, lens, messages
+from viewer.model import depth, inspection, lens, messages, viewpoint
 from viewer.model.action import do
 from viewer.model.inspection import beside_of, sheet_cells
 from viewer.model.layout import layout_of
@@ -20,6 +19,9 @@ from viewer.model.state.app_state import Hover
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.inspection import OVERLAYS
 from viewer.model.state.notices import Notice
+from viewer.model.state.viewpoint import Zoom
+from viewer.model.window import layout_for
+from viewer.ui.style import DARK
 
 SIZE = 640, 1000
 GRID = GridShape(3, 3)
@@ -166,16 +168,46 @@ def test_the_ring_of_a_picked_depth_stays_on_its_surface(viewer, eye):
     np.testing.assert_allclose(middle, (HEIGHT / 2 - 20 * eye.t, WIDTH / 2 - 20 * eye.s), atol=0.5)
 
 
-def test_a_stroke_under_way_is_seen_in_colours(viewer):
-    """Where it is painted, and nowhere else."""
-    viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
-    preview, before = DepthPreview(viewer.view), viewer.screen(SIZE).astype(int)
-    for stroke in (Stroke("farther", ((0.5, 0.5),), 0.1, 1.0), None):
-        viewer.state = replace(viewer.state, stroke=stroke)
-        preview.update(viewer.state)
-        changed = part(np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24, layout_now(viewer).picture)
-        rows, columns = np.nonzero(changed)
-        assert (rows.size > 200) == (stroke is not None)
-        if stroke is not None:
-            height, width = changed.shape
-            assert np.hypot((columns - width / 2) / width, (rows - height / 2) / width).max() < 0.12
+def places_of(screen, color, tolerance=40):
+    """(N, 2): rows and columns of the pixels of a colour of the marks."""
+    return np.argwhere(np.abs(screen.astype(int) - np.multiply(color[:3], 255)).max(axis=2) < tolerance)
+
+
+def test_marks_in_an_epi_show_the_viewpoint_and_the_slope_of_the_surface(viewer):
+    """A surface of disparity d is seen d px further left in the next view to the right."""
+    hover = do(inspection.set_hover, Hover(40.0, 32.0, 4.0))
+    viewer.do(do(inspection.show_epis, True), hover, do(lens.move_eye, ViewOffset(0, 0.5)))
+    layout, screen = layout_now(viewer), viewer.screen(SIZE)
+    strip = part(screen, layout.strip_across)
+    px = layout.strip_across.width / WIDTH
+    eye = places_of(strip, DARK.accent)
+    assert eye[:, 0].mean() == pytest.approx(2 / 3 * strip.shape[0], abs=2)
+    slope = places_of(strip, DARK.warning)
+    first, last = (slope[np.abs(slope[:, 0] - row) <= 1][:, 1].mean() for row in (3, strip.shape[0] - 4))
+    views = 3 * (strip.shape[0] - 7) / strip.shape[0]
+    assert last - first == pytest.approx(-4.0 * px * views, abs=3)
+    down = part(screen, layout.strip_down)
+    assert places_of(down, DARK.accent)[:, 1].mean() == pytest.approx(down.shape[1] / 2, abs=2)
+
+
+def test_a_zoomed_picture_has_its_own_values_strips_and_a_frame_on_the_minimap(viewer):
+    viewer.do(do(inspection.show_values, True), do(inspection.show_epis, True))
+    viewer.do(do(viewpoint.set_zoom, Zoom(3 * layout_now(viewer).fit, (0.7, 0.4))))
+    viewer.do(do(inspection.set_hover, Hover(58.0, 26.0, None)))
+    size = ScreenSize(1100, 900)
+    screen, layout = viewer.screen(size), layout_for(viewer.state, size, 1.0, 1.0)
+    red, green, blue = viewer.state.inspection.probe.rgb
+    assert red > green + 60 > blue, "the red square"
+    seen, small = layout.part, part(screen, layout.minimap)
+    frame = places_of(small, DARK.text, 25)
+    share = np.array(small.shape[:2])
+    np.testing.assert_allclose(frame.min(axis=0) / share, (seen.y, seen.x), atol=0.04)
+    np.testing.assert_allclose(frame.max(axis=0) / share, (seen.y + seen.height, seen.x + seen.width), atol=0.04)
+    strip, picture = part(screen, layout.strip_across).astype(int), part(screen, layout.frame).astype(int)
+    row = round((26.5 / HEIGHT - seen.y) / seen.height * picture.shape[0])
+    near = np.abs(strip[strip.shape[0] // 3 + 3] - picture[row]).max(axis=1)
+    assert np.median(near) <= 6, "the strip shows the seen part"
+    viewer.do(do(lens.set_exposure, -2.0), do(inspection.set_hover, None))
+    dark = viewer.screen(size)
+    for rect in (layout.minimap, layout.strip_across, layout.strip_down):
+        assert np.median(part(dark, rect)) < 0.7 * np.median(part(screen, rect)), "as dark as the picture"
