@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -18,18 +18,17 @@ if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class GlossRequest:
-    """A request for the maps of a glossy surface. centre: has a disparity. normals: of the centre view, if known."""
+    """A request for the maps of a glossy surface; equal requests have the same answer.
+
+    centre: has a disparity. normals: of the centre view, if known.
+    """
 
     surface: GlossSurface
-    scene: Scene
+    scene: Scene = field(compare=False)
     centre: ViewUpdate
-    normals: FloatImage | None = None
-
-    def is_like(self, other: GlossRequest) -> bool:
-        """Return whether both have the same answer."""
-        return self.surface == other.surface and self.centre is other.centre
+    normals: FloatImage | None = field(default=None, compare=False)
 
 
 def gloss_request(

@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
+from typing import Protocol
 
 from iibr_core.scenes.scene import Source
+from iibr_core.scenes.scene_gloss import GlossRequest
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
@@ -22,10 +25,10 @@ from viewer.app.preferences_store import PreferencesKeeper, load_preferences
 from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
-from viewer.app.side_effects import SideEffects
+from viewer.app.side_effects import SAVE_BUDGET_S, SideEffects
 from viewer.app.stereo_screen import StereoScreen
 from viewer.app.window import Window
-from viewer.background.maps import EntropyWork, GlossFinder, SurfaceWork
+from viewer.background.maps import EntropyWork, Finder, SurfaceWork, find_gloss
 from viewer.background.newest import Newest
 from viewer.background.receiver import Receiver
 from viewer.background.tracker import Tracker
@@ -33,7 +36,7 @@ from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.context import create_for_window
-from viewer.model import gesture, inspection, opening, preferences, saving, viewpoint, window
+from viewer.model import gesture, inspection, opening, preferences, saving, selection, viewpoint, window
 from viewer.model.action import Action, ask, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES
 from viewer.model.layout import Layout, is_narrow
@@ -48,8 +51,16 @@ from viewer.ui.style import Look
 
 VIEWS_BUDGET_S = 0.006
 """Time for uploading views in a turn of the loop, in seconds."""
-SAVE_BUDGET_S = 0.025
-"""Time for drawing a picture that is being saved in a turn of the loop, in seconds: about as long as a frame."""
+
+
+class Worker(Protocol):
+    """Work beside the window."""
+
+    def advance(self, state: AppState) -> list[Action]:
+        """Begin what the state asks for, and return what came of it."""
+
+    def close(self) -> None:
+        """Stop the work and wait for its threads."""
 
 
 class App:
@@ -72,9 +83,9 @@ class App:
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, self.window.wake)
         self.free_camera_view = FreeCameraView(self.scene_view, self.window.wake)
-        self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, self.window.wake)
-        self._entropy = Newest("iibr-entropy", EntropyWork(), self.window.wake)
-        self._surfaces = Newest("iibr-surface", SurfaceWork(), self.window.wake)
+        view, wake = self.inspection_view, self.window.wake
+        newest_gloss = Newest("iibr-gloss", find_gloss, wake)
+        self.gloss_finder = Finder(newest_gloss, self._gloss_request, self.scene_view.take_gloss)
         self._tracker = Tracker(self.window.wake)
         self.receiver = Receiver(self.window.wake)
         self._ui = UiHost(self.look(), self.window.handle)
@@ -83,6 +94,18 @@ class App:
         self._side_effects = SideEffects(self.scene_view, self.window.wake, self.window.clipboard_text)
         self._sessions = SessionStore(kept_in, self.window.wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
+        newest_entropy, give_up = Newest("iibr-entropy", EntropyWork(), wake), lambda: [do(selection.deselect)]
+        self._workers: tuple[Worker, ...] = (
+            Finder(newest_entropy, view.entropy_request, view.take_entropy, view.give_up_entropy),
+            Finder(Newest("iibr-surface", SurfaceWork(), wake), view.surface_request, view.take_surface, give_up),
+            self.gloss_finder,
+            self.free_camera_view,
+            self.stereo_screen,
+            self._tracker,
+            self._sessions,
+            self._side_effects,
+            self.scene_loader,
+        )
         self._notice_clock = NoticeClock()
         self._shown: tuple[object, ...] = ()
         self._pointer = NO_POINTER
@@ -98,13 +121,10 @@ class App:
     def step(self) -> None:
         """Take one turn of the loop; it sleeps first if nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
-        start = time.perf_counter()
-        views_end = start + VIEWS_BUDGET_S
-        news = self.scene_loader.take_results(self.state, views_end) + self._take_events()
+        start = self._pace.stepped_at = time.perf_counter()
+        news = [*chain.from_iterable(worker.advance(self.state) for worker in self._workers), *self._take_events()]
         self.do(*news)
-        self._pace.is_busy = self.scene_view.upload(views_end - time.perf_counter()) or bool(news)
-        self.do(*self.scene_loader.preview_depth(self.state))
-        self.do(*self.gloss_finder.advance(self.state.optics.gloss))
+        self._pace.is_busy = self.scene_view.upload(VIEWS_BUDGET_S) or bool(news)
         layout, look = self.layout(), self.look()
         picture = self._draw_picture(layout)
         if picture and self.scene_view.report != self.state.report:
@@ -129,15 +149,12 @@ class App:
             self.window.show_icon()
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
-        self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))
-        self._inspect()
+        probe = self.inspection_view.probe(self.state)
+        if probe != self.state.inspection.probe:
+            self.do(do(inspection.set_probe, probe))
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
-        self.do(*self.free_camera_view.advance(self.state))
-        is_drawing = self._side_effects.is_drawing or self.sharpener.is_drawing or self.inspection_view.is_drawing
-        is_drawing |= self.stereo_screen.view.is_drawing
-        self._pace.is_busy |= bool(actions) or is_drawing
-        self.scene_loader.advance(self.state)
-        self.do(*self._preferences.keep(self.state))
+        drawn = self._side_effects, self.sharpener, self.inspection_view, self.stereo_screen.view
+        self._pace.is_busy |= bool(actions) or any(part.is_drawing for part in drawn)
         self._pace.took_s.append(time.perf_counter() - start)
 
     def _draw_picture(self, layout: Layout) -> Picture | None:
@@ -177,25 +194,16 @@ class App:
         return Look(self.window.ui_scale * self.state.preferences.font_scale, self.state.preferences.theme)
 
     def close(self) -> None:
-        """Finish files that are being written, keep preferences and session, stop all threads, and free everything."""
+        """Keep preferences and session, stop all threads, finish files that are being written, and free everything."""
         self.window.hide()
-        self.scene_loader.close()
-        self._entropy.close()
-        self._surfaces.close()
-        self._tracker.close()
+        self._preferences.keep(self.state)
+        self._sessions.keep(self.state)
         self.receiver.close()
-        self.gloss_finder.close()
-        self._preferences.keep(self.state, is_closing=True)
-        self._sessions.close(self.state)
-        self._side_effects.close()
-        self._ui.release()
-        self._filmstrip.release()
         self.sharpener.close()
-        self.free_camera_view.close()
-        self.stereo_screen.close()
-        self.inspection_view.release()
-        self.scene_view.release()
-        self._gl.release()
+        for worker in reversed(self._workers):
+            worker.close()
+        for part in (self._ui, self._filmstrip, self.inspection_view, self.scene_view, self._gl):
+            part.release()
         self.window.close()
 
     def do(self, *actions: Action) -> None:
@@ -207,21 +215,14 @@ class App:
         self.scene_loader.look_from(self.state.optics.eye)
 
     def _take_events(self) -> list[Action]:
-        """Return actions that come from side effects, sessions, other threads, the clock and the window."""
-        self._pace.stepped_at = time.perf_counter()
-        actions = self._side_effects.run(self.state) + self._sessions.run(self.state)
-        while (result := self._entropy.next_result()) is not None:
-            actions += self.inspection_view.take_entropy(result)
-        while (found := self._surfaces.next_result()) is not None:
-            actions += self.inspection_view.take_surface(found)
+        """Return actions that come from the clock, the window, and later starts of the program."""
         pointer = self._pointer
         is_on_notice = pointer.is_over_panel and not self.layout().panel.contains(pointer.x, pointer.y)
-        actions += self._notice_clock.expire(self.state, self._pace.stepped_at, is_on_notice)
+        actions = self._notice_clock.expire(self.state, self._pace.stepped_at, is_on_notice)
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
-        actions += self._tracker.advance(self.state)
-        actions += self.stereo_screen.follow(self.state)
-        actions += self._place_window() + actions_from_drop(self.window.take_dropped(), self.state)
+        actions += self._preferences.advance(self.state) + self._place_window()
+        actions += actions_from_drop(self.window.take_dropped(), self.state)
         if (received := self.receiver.take()) is not None:
             self.window.ask_for_attention()
             actions += actions_from_drop(received, self.state)
@@ -246,15 +247,8 @@ class App:
         actions += [do(gesture.end_gesture)] if pointer.is_released else []  # after the edits of the frame
         return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 
-    def _inspect(self) -> None:
-        """Look up the values under the pointer, and ask for the maps that are wanted."""
-        probe = self.inspection_view.probe(self.state)
-        if probe != self.state.inspection.probe:
-            self.do(do(inspection.set_probe, probe))
-        if (entropy := self.inspection_view.entropy_request(self.state)) is not None:
-            self._entropy.submit(entropy)
-        if (surface := self.inspection_view.surface_request(self.state)) is not None:
-            self._surfaces.submit(surface)
+    def _gloss_request(self, state: AppState) -> GlossRequest | None:
+        return self.scene_view.gloss_request(state.optics.gloss)
 
     def _show(self, frame: tuple[object, ...]) -> None:
         """Draw a frame, unless all that the window shows is as in the frame before."""

@@ -69,11 +69,15 @@ class PreferencesKeeper:
         """folder: None keeps nothing. state: as it was read from there."""
         self._folder, self._kept = folder, _without_place(state)
 
-    def keep(self, state: AppState, is_closing: bool = False) -> list[Action]:
-        """Write them if they changed, or if the window closes; return a notice if that fails."""
-        if self._folder is None or (_without_place(state) == self._kept and not is_closing):
-            return []
+    def advance(self, state: AppState) -> list[Action]:
+        """Write them if they changed."""
+        return [] if _without_place(state) == self._kept else self.keep(state)
+
+    def keep(self, state: AppState) -> list[Action]:
+        """Write them; return a notice if that fails."""
         self._kept = _without_place(state)
+        if self._folder is None:
+            return []
         try:
             store_preferences(state, self._folder)
         except InputError as error:

@@ -37,6 +37,8 @@ SKETCHES_FIRST = 3
 """Number of photos that are read at a small size before the open photo is read whole, so that quick steps show a
 picture. The first photo does not wait for the next ones.
 """
+TAKING_S = 0.006
+"""Time for results in a turn of the loop, in seconds."""
 PROGRESS_S = 0.25
 """Time between two updates of the progress, in seconds: each update draws a frame."""
 
@@ -75,12 +77,34 @@ class SceneLoader:
         """Make views near this viewpoint first."""
         self._work.eye = eye
 
-    def take_results(self, state: AppState, until: float) -> list[Action]:
-        """Return results as actions, at least one result, and more until this time on the clock.
+    def advance(self, state: AppState) -> list[Action]:
+        """Submit the source that the state asks for, read the next photos, and show what came of it.
+
+        The brush is prepared once the first photo's views are there, so that the first stroke does not wait.
+        """
+        if sketch := self._show_sketch(state):
+            return sketch  # the rest goes by the state that shows it
+        if state.stopped == state.generation != self._stopped:
+            self._worker.cancel()
+            self._stopped = state.stopped
+        self._read_sketches(state)
+        is_wanted = state.generation not in (self._submitted, state.stopped)
+        if is_wanted and state.source is not None and state.stroke is None:
+            self._load(state, state.source)
+        self._read_ahead(state)
+        is_brush_next = self._scene_view.loaded is not None and (state.progress.is_complete or state.brush.is_on)
+        if is_brush_next and not self._is_brush_asked:
+            self._is_brush_asked = True
+            self._brush_loader.submit(None)
+        return self._preview_depth(state) + self._take_results(state)
+
+    def _take_results(self, state: AppState) -> list[Action]:
+        """Return results as actions, at least one result, and more until TAKING_S are over.
 
         Progress alone is returned every PROGRESS_S, and when it is complete.
         """
-        actions = self._show_sketch(state) + self._depth_finder.advance(state, self._scene_view.loaded)
+        until = time.perf_counter() + TAKING_S
+        actions = self._depth_finder.advance(state, self._scene_view.loaded)
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             self._held += self._take(result, state)
             self._is_urgent |= not (isinstance(result, ViewReady | WorkReport) and not result.progress.is_complete)
@@ -98,7 +122,7 @@ class SceneLoader:
         """Whether progress was made that the state does not show yet."""
         return bool(self._held)
 
-    def preview_depth(self, state: AppState) -> list[Action]:
+    def _preview_depth(self, state: AppState) -> list[Action]:
         """Show the depth while it is edited; stop making views of the depth before."""
         if not is_ahead(state, self._depth_settings):
             return []
@@ -108,24 +132,6 @@ class SceneLoader:
         except InputError as error:
             return [do(messages.notify, Notice(words_of(error), is_error=True)), do(depth.drop_stroke)]
         return []
-
-    def advance(self, state: AppState) -> None:
-        """Submit the source that the state asks for, and read the next photos.
-
-        The brush is prepared once the first photo's views are there, so that the first stroke does not wait.
-        """
-        if state.stopped == state.generation != self._stopped:
-            self._worker.cancel()
-            self._stopped = state.stopped
-        self._read_sketches(state)
-        is_wanted = state.generation not in (self._submitted, state.stopped)
-        if is_wanted and state.source is not None and state.stroke is None:
-            self._load(state, state.source)
-        self._read_ahead(state)
-        is_brush_next = self._scene_view.loaded is not None and (state.progress.is_complete or state.brush.is_on)
-        if is_brush_next and not self._is_brush_asked:
-            self._is_brush_asked = True
-            self._brush_loader.submit(None)
 
     def close(self) -> None:
         """Stop making and reading."""

@@ -50,7 +50,7 @@ class SessionStore:
         self._changed_at = 0.0
         self._has_failed = False
 
-    def run(self, state: AppState) -> list[Action]:
+    def advance(self, state: AppState) -> list[Action]:
         """Look for the session of a scene that was just opened, and write what was changed a while ago."""
         if self._folder is None:
             return []
@@ -69,11 +69,14 @@ class SessionStore:
             self._follow(_settings_now(state, scene))
         return []
 
-    def close(self, state: AppState) -> None:
-        """Write the session of the open photo, and wait for it."""
+    def keep(self, state: AppState) -> None:
+        """Write the session of the open photo."""
         if self._search is None and self._scene is not None and state.source is self._scene.source:
             self._latest = _settings_now(state, self._scene)
         self._save()
+
+    def close(self) -> None:
+        """Wait for what is being written."""
         self._executor.shutdown()
 
     def _follow(self, settings: SavedSettings) -> None:

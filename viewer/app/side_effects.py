@@ -35,6 +35,9 @@ from viewer.model.state.folder import PhotoFacts
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import ChoiceOf, PathPrompt
 
+SAVE_BUDGET_S = 0.025
+"""Time for drawing a picture that is being saved in a turn of the loop, in seconds: about as long as a frame."""
+
 
 class SideEffects:
     """Begins tasks in the window's thread; files are read and written in other threads."""
@@ -60,19 +63,15 @@ class SideEffects:
         """Whether a picture is being drawn to be saved or exported."""
         return self._jobs.is_drawing
 
-    def run(self, state: AppState) -> list[Action]:
-        """Begin the state's tasks, and return the results of earlier ones."""
+    def advance(self, state: AppState) -> list[Action]:
+        """Begin the state's tasks, draw for files, and return the results of earlier tasks."""
         actions: list[Action] = [do(forget_tasks)] if state.tasks else []
         actions += self._take_results() + self._take_answer(state)
         while (result := self._downloads.next_result()) is not None:
             actions += actions_of_download(result)
         for task in state.tasks:
             actions += self._begin(task, state)
-        return actions
-
-    def draw(self, state: AppState, budget_s: float) -> list[Action]:
-        """Continue saves, copies and exports for about `budget_s`."""
-        return self._jobs.advance(state, budget_s)
+        return actions + self._jobs.advance(state, SAVE_BUDGET_S)
 
     def close(self) -> None:
         """Finish the files that are being written; cancel everything else."""

@@ -109,7 +109,7 @@ class StereoScreen:
         """GL name of the picture that fills the first window, None unless it shows one."""
         return self.view.screen.texture.glo if self.view.drawn is not None and self.second is None else None
 
-    def follow(self, state: AppState) -> list[Action]:
+    def advance(self, state: AppState) -> list[Action]:
         """Open, move or close the second window as the state asks; return what the user or the system changed."""
         monitors, wanted = self._window.monitors, state.stereo.monitor if state.stereo.is_shown else None
         if monitors != state.monitors:

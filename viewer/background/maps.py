@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import Stroke, extent_of
-from iibr_core.gloss.settings import Gloss
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from iibr_core.stages import CLOSED_FORM
-from viewer.background.newest import Failed, Newest, Post
+from viewer.background.newest import Failed, Newest, Post, Request, Result
 from viewer.model import messages
 from viewer.model.action import Action, do
+from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import ViewIndex
 from viewer.model.state.notices import Notice
+
+if TYPE_CHECKING:
+    from iibr_core.gloss.shading import GlossMaps
 
 RANGE_PERCENTILES = 5.0, 95.0
 """Percentiles of the disparity of a surface that count as its far and near end."""
@@ -116,31 +119,36 @@ def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask & ~inside
 
 
-class GlossFinder:
-    """Finds gloss maps; until they are ready, the picture shows no gloss. asked: the last request."""
+class Finder(Generic[Request, Result]):
+    """Finds, in a thread, what the state wants. asked: the last request."""
 
     def __init__(
         self,
-        request_for: Callable[[Gloss | None], GlossRequest | None],
-        take: Callable[[Any], None],
-        wake: Callable[[], None],
+        newest: Newest[Request, Result],
+        request_for: Callable[[AppState], Request | None],
+        take: Callable[[Result], Sequence[Action] | None],
+        give_up: Callable[[], Sequence[Action]] = tuple,
     ) -> None:
-        """request_for: returns the request for missing maps. take: shows maps. wake: called when there is a result."""
-        self.asked: GlossRequest | None = None
-        self._worker: Newest[GlossRequest, Any] = Newest("iibr-gloss", lambda ask, post: post(make_maps(ask)), wake)
-        self._request_for, self._take = request_for, take
-        self.close = self._worker.close
+        """request_for: returns a request for what is missing. take: shows a result. give_up: called after a failure."""
+        self.asked: Request | None = None
+        self._newest, self._request_for, self._take, self._give_up = newest, request_for, take, give_up
+        self.close = newest.close
 
-    def advance(self, gloss: Gloss | None) -> list[Action]:
-        """Show new maps, report errors, and request missing maps. gloss: of the picture."""
+    def advance(self, state: AppState) -> list[Action]:
+        """Show new results, report failures, and request what is missing."""
         actions: list[Action] = []
-        while (result := self._worker.next_result()) is not None:
+        while (result := self._newest.next_result()) is not None:
             if isinstance(result, Failed):
-                actions.append(do(messages.notify, Notice(result.message, is_error=True)))
+                actions += [do(messages.notify, Notice(result.message, is_error=True)), *self._give_up()]
             else:
-                self._take(result)
-        request = self._request_for(gloss)
-        if request is not None and (self.asked is None or not self.asked.is_like(request)):
+                actions += self._take(result) or ()
+        request = self._request_for(state)
+        if request is not None and request != self.asked:
             self.asked = request
-            self._worker.submit(request)
+            self._newest.submit(request)
         return actions
+
+
+def find_gloss(request: GlossRequest, post: Post[GlossMaps]) -> None:
+    """Post the gloss maps; until they are ready, the picture shows no gloss."""
+    post(make_maps(request))

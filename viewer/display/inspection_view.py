@@ -18,21 +18,19 @@ from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset, ViewUpdate
 from viewer.background.maps import Entropy, EntropyRequest, Surface, SurfaceRequest
-from viewer.background.newest import Failed
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
-from viewer.model import inspection, messages, selection
+from viewer.model import inspection, selection
 from viewer.model.action import Action, do
 from viewer.model.colormap import VIRIDIS
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout, whole_pixels
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Origin, OverlayKind, Probe, ViewIndex
-from viewer.model.state.notices import Notice
 
 MASK_COLORS = {"inpainted": (255, 184, 60), "surface": (80, 240, 220)}
 """Colours (sRGB bytes) of overlays that are masks."""
@@ -136,13 +134,14 @@ class InspectionView:
         self._entropy_asked = asked
         return EntropyRequest(*asked, view.loaded, scene.plan, scene.source.inpaint)
 
-    def take_entropy(self, result: Entropy | Failed[EntropyRequest]) -> list[Action]:
-        """Show an entropy map; a failure takes the overlay away."""
-        if isinstance(result, Failed):
-            self._entropy_asked = None
-            return [do(messages.notify, Notice(result.message, is_error=True)), do(inspection.set_overlay, None)]
-        self._entropy = result
-        return []
+    def take_entropy(self, entropy: Entropy) -> None:
+        """Show an entropy map."""
+        self._entropy = entropy
+
+    def give_up_entropy(self) -> list[Action]:
+        """Take the overlay away; it may be asked for again."""
+        self._entropy_asked = None
+        return [do(inspection.set_overlay, None)]
 
     def surface_request(self, state: AppState) -> SurfaceRequest | None:
         """Return the surface to be found now; None where none is selected, or it was asked for before."""
@@ -156,12 +155,10 @@ class InspectionView:
         self._surface_asked = asked, loaded
         return SurfaceRequest(asked, loaded, scene.plan)
 
-    def take_surface(self, result: Surface | Failed[SurfaceRequest]) -> list[Action]:
+    def take_surface(self, surface: Surface) -> list[Action]:
         """Show the selected surface."""
-        if isinstance(result, Failed):
-            return [do(messages.notify, Notice(result.message, is_error=True)), do(selection.deselect)]
-        self._surface = result
-        return [do(selection.set_range, result.range_px)]
+        self._surface = surface
+        return [do(selection.set_range, surface.range_px)]
 
     def release(self) -> None:
         """Free the GL objects."""

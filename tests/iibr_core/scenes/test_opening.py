@@ -153,8 +153,8 @@ def test_gloss_maps_are_made_once_for_a_surface(photo_path) -> None:
     assert gloss_request(gloss, scene, replace(centre, disparity=None)) is None
     again = gloss_request(replace(gloss, surface=GlossSurface(0.5)), scene, centre, maps)
     assert again.normals is maps.normals
-    assert request.is_like(gloss_request(gloss, scene, centre))
-    assert not request.is_like(again)
+    assert request == gloss_request(gloss, scene, centre)
+    assert request != again
     views = [centre, ViewUpdate(0, 0, centre.colors, centre.disparity)]
     assert list(add_gloss(iter(views), None, scene)) == views
     assert any((shown.colors != view.colors).any() for shown, view in zip(add_gloss(iter(views), gloss, scene), views))

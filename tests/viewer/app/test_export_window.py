@@ -119,7 +119,7 @@ def bytes_of(path):
 
 @pytest.mark.parametrize("name", ["field", "a.exr"])
 def test_a_file_shows_what_was_asked_for_whatever_is_changed_meanwhile(viewer, tmp_path, gate, monkeypatch, name):
-    monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
+    monkeypatch.setattr("viewer.app.side_effects.SAVE_BUDGET_S", 0.0)
     app = viewer.app
 
     def task(folder):

@@ -93,6 +93,6 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
 def test_who_has_no_home_folder_is_not_asked_to_choose_another(tmp_path):
     (tmp_path / "file").touch()
     keeper = PreferencesKeeper(AppState(), tmp_path / "file" / "folder")
-    (notice,) = reduce(AppState(), keeper.keep(AppState(), is_closing=True)[0]).notices
+    (notice,) = reduce(AppState(), keeper.keep(AppState())[0]).notices
     assert notice.text.startswith("Settings and recent photos are not kept. ")
     assert "choose" not in notice.text

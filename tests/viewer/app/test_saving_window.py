@@ -31,7 +31,7 @@ TINY = ScreenSize(48, 32)
 @pytest.fixture
 def viewer(open_window, photo_path, monkeypatch):
     """One small step of a picture a turn, and many passes: so there are many turns however fast the machine is."""
-    monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
+    monkeypatch.setattr("viewer.app.side_effects.SAVE_BUDGET_S", 0.0)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()

@@ -105,10 +105,11 @@ def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(open_window, phot
     driver.until_idle()
     state, other = driver.app.state, Source(str(tmp_path / "other.png"))
     store = SessionStore(tmp_path / "kept", lambda: None)
-    while not store.run(state):
+    while not store.advance(state):
         driver.app.step()
-    store.run(replace(state, source=other, scene=replace(state.scene, source=other)))
-    store.close(state)
+    store.advance(replace(state, source=other, scene=replace(state.scene, source=other)))
+    store.keep(state)
+    store.close()
     assert session.read_text("utf-8") == kept
 
 
