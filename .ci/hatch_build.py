@@ -40,7 +40,7 @@ class PackageHook(BuildHookInterface[Any]):
             self._add_kernels(build_data)
 
     def _add_commit(self, build_data: dict[str, Any]) -> None:
-        commit = runpy.run_path(str(Path(self.root, "viewer/model/version.py")))["program_commit"]()
+        commit = runpy.run_path(str(Path(self.root, "viewer/version.py")))["program_commit"]()
         self._scratch = tempfile.TemporaryDirectory()
         file = Path(self._scratch.name, "commit.txt")
         file.write_text(f"{commit}\n", "utf-8")

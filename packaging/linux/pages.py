@@ -20,7 +20,7 @@ from typing import Any
 import typer
 
 from viewer.cli.main import app
-from viewer.model.version import program_version
+from viewer.version import program_version
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

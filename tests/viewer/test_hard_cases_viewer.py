@@ -19,11 +19,11 @@ from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
+from viewer.app.picture_files import read_settings
 from viewer.background.newest import Failed
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
-from viewer.model.saved_settings import read_settings
 
 GRID = GridShape(3, 3)
 

@@ -17,6 +17,7 @@ from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_camera_view import FreeCameraView
+from viewer.app.handover import Receiver
 from viewer.app.interruption import interruptions
 from viewer.app.keys import actions_from_keys, read_keys
 from viewer.app.pace import DIALOG_LOOK_S, IDLE_WAIT_S, NoticeClock, Pace
@@ -30,7 +31,6 @@ from viewer.app.stereo_screen import StereoScreen
 from viewer.app.window import Window
 from viewer.background.maps import EntropyWork, Finder, SurfaceWork, find_gloss
 from viewer.background.newest import Newest
-from viewer.background.receiver import Receiver
 from viewer.background.tracker import Tracker
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView

@@ -15,7 +15,7 @@ from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, requ
 from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, ImageSize
+from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
 from viewer.model.saving import settings_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
@@ -53,6 +53,17 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
     metadata = PictureMetadata(of_photo.exif, of_photo.xmp, {SETTINGS_KEY: settings_text(shot.settings)})
     write_picture(path, drawn, shot.form, metadata, shot.color_space)
     return path
+
+
+def read_settings(path: Path) -> SavedSettings:
+    """Return the settings that a picture was saved with. Raises InputError if there are none, or damaged ones."""
+    from iibr_core.formats.images.open_picture import settings_text_in
+    from viewer.model.saved_settings import settings_from_text
+
+    text = settings_text_in(path)
+    if not text:
+        raise InputError(f"{path}: holds no settings of iibr; give a picture saved with Ctrl+S or `iibr screenshot`")
+    return settings_from_text(text, str(path))
 
 
 def inputs_of_scene(state: AppState) -> tuple[Path, ...]:

@@ -9,13 +9,10 @@ import typer
 
 from iibr_core.scenes.scene import Source
 from viewer.app.dropped_files import actions_from_drop
+from viewer.app.handover import hand_over
 from viewer.cli.options import require_source
 from viewer.cli.view import open_window
-from viewer.model.handover import TAKEN, message_from_paths, window_address
 from viewer.model.state.app_state import AppState
-
-ANSWER_S = 3.0
-"""Time for the running window to answer, in seconds."""
 
 
 def open_photos(
@@ -33,18 +30,3 @@ def open_photos(
         require_source(Source(name))
     if not hand_over(names):
         open_window(None, 1.0, *actions_from_drop(names, AppState()))
-
-
-def hand_over(paths: list[str]) -> bool:
-    """Let the running window open these paths; return whether it does."""
-    from multiprocessing.connection import Client  # no other command needs it
-
-    address = window_address()
-    if address is None:
-        return False
-    try:
-        with Client(address) as connection:
-            connection.send_bytes(message_from_paths(paths))
-            return connection.poll(ANSWER_S) and connection.recv_bytes(len(TAKEN)) == TAKEN
-    except (OSError, EOFError):
-        return False

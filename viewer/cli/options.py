@@ -369,7 +369,7 @@ def gloss_of(path: Path | None) -> Gloss | None:
     """Return the gloss in a file. Raises InputError."""
     if path is None:
         return None
-    from viewer.model.gloss_file import read_gloss  # imports msgspec
+    from viewer.app.gloss_file import read_gloss  # imports msgspec
 
     return read_gloss(path)
 

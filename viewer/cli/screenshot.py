@@ -19,7 +19,7 @@ from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ImageSize, InputError
-from viewer.app.picture_files import export_picture, require_picture_place, shot_of
+from viewer.app.picture_files import export_picture, read_settings, require_picture_place, shot_of
 from viewer.cli import options as shared
 from viewer.cli.messages import print_notes, show_progress
 from viewer.cli.option_records import flag, option, output_option, with_option_records
@@ -103,7 +103,7 @@ def screenshot(
     if like is not None:
         from viewer.model import saved_settings
 
-        settings, given = saved_settings.read_settings(like), shared.given_options(context)
+        settings, given = read_settings(like), shared.given_options(context)
         if size is None:
             saved_settings.require_saved_size(settings, like)
             size = ScreenSize(*settings.size_px)

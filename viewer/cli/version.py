@@ -12,7 +12,7 @@ from iibr_core.types import InputError
 def print_version(is_wanted: bool) -> None:
     """Print the versions and end the program if that is wanted."""
     if is_wanted:
-        from viewer.model.version import program_commit, program_version
+        from viewer.version import program_commit, program_version
 
         print(f"iibr {program_version()}")
         print(f"commit {program_commit()}")

@@ -8,7 +8,7 @@ Import this module late: msgspec takes 10 to 40 ms, which the window's first fra
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,17 +16,38 @@ import msgspec
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
-from iibr_core.formats.images.open_picture import settings_text_in
+from iibr_core.formats.files import printable
+from iibr_core.gloss.settings import (
+    LIGHT_RADIUS_LIMITS_DEG,
+    MAX_STROKE_POINTS,
+    MAX_TOLERANCE,
+    STROKE_RADIUS_LIMITS,
+    Gloss,
+)
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
-from viewer.model.gloss_file import GLOSS_LIMITS, require_points, require_within, short_reason, unknown_fields
 from viewer.model.state.saving import SavedSettings
 
 FORMAT = 1
 MAX_CHARACTERS = 16_000_000
 """Largest length of the text; a thousand strokes take 1.3 million."""
+Limits = Mapping[str, tuple[float, float]]
+"""Smallest and largest value of each number, by its name with dots."""
+GLOSS_LIMITS: Limits = {
+    "roughness": (0.0, 1.0),
+    "reflectance": (0.0, 1.0),
+    "surface.farthest": (0.0, 1.0),
+    "surface.nearest": (0.0, 1.0),
+    "surface.color": (0.0, 1.0),
+    "surface.tolerance": (0.0, MAX_TOLERANCE),
+    "surface.strokes.points": (-1.0, 2.0),
+    "surface.strokes.radius": STROKE_RADIUS_LIMITS,
+    "light.direction": (-1e6, 1e6),
+    "light.color": (0.0, 100.0),
+    "light.radius_deg": LIGHT_RADIUS_LIMITS_DEG,
+}
 OPTICS_LIMITS = {
     "optics.aperture_shape.blades": BLADES_LIMITS,
     "optics.aperture_shape.mask.rows": (1, 4096),
@@ -123,14 +144,6 @@ def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSetti
     return SavedSettings(**fields)
 
 
-def read_settings(path: Path) -> SavedSettings:
-    """Return the settings that a picture was saved with. Raises InputError if there are none, or damaged ones."""
-    text = settings_text_in(path)
-    if not text:
-        raise InputError(f"{path}: holds no settings of iibr; give a picture saved with Ctrl+S or `iibr screenshot`")
-    return settings_from_text(text, str(path))
-
-
 def require_saved_size(saved: SavedSettings, path: Path) -> None:
     """Raise InputError if the settings ask for a larger picture than this program draws."""
     width, height = saved.size_px
@@ -193,3 +206,49 @@ def _require_sound(optics: Optics) -> None:
         raise ValueError("optics.aperture_shape.mask is empty or of another size")
     if optics.gloss is not None:
         require_points(optics.gloss)
+
+
+def require_within(record: object, limits: Limits) -> None:
+    """Raise ValueError, naming the field, if a number of a record or of its parts is out of its limits."""
+    for name, value in _numbers_in(msgspec.to_builtins(record)):
+        if name in limits and not limits[name][0] <= value <= limits[name][1]:
+            raise ValueError("{}: {} is not from {:g} to {:g}".format(name, value, *limits[name]))
+
+
+def require_points(gloss: Gloss) -> None:
+    """Raise ValueError if a stroke has no points or too many."""
+    if not all(1 <= len(stroke.points) <= MAX_STROKE_POINTS for stroke in gloss.surface.strokes):
+        raise ValueError(f"surface.strokes: a stroke has 1 to {MAX_STROKE_POINTS:,} points")
+
+
+def short_reason(error: Exception) -> str:
+    """Return the message of an error in one short line, with the field that msgspec names."""
+    return " ".join(str(error).replace("- at `$.", "at `").split())[:120]
+
+
+def _numbers_in(value: Any, name: str = "") -> Iterator[tuple[str, float]]:
+    """Yield all numbers in dictionaries and lists, with their names; the items of a list have the list's name."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from _numbers_in(part, f"{name}.{key}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for part in value:
+            yield from _numbers_in(part, name)
+    elif isinstance(value, int | float):
+        yield name, value
+
+
+def unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
+    """Yield the names, with dots, of fields that are in the text but not in what was read from it.
+
+    Fields that are false or "" are skipped: earlier versions wrote them for absent values.
+    """
+    if isinstance(raw, dict) and isinstance(known, dict):
+        for name, value in raw.items():
+            if name in known:
+                yield from unknown_fields(value, known[name], f"{within}{name}.")
+            elif value is not False and value != "":
+                yield within + printable(" ".join(name.split())[:40])
+    elif isinstance(raw, list) and isinstance(known, list | tuple):
+        for value, known_value in zip(raw, known):
+            yield from unknown_fields(value, known_value, within)

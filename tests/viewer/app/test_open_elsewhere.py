@@ -9,7 +9,7 @@ import pytest
 
 from tests.forked_iibr import run_forked
 from tests.viewer.conftest import DEADLINE_S, write_scene
-from viewer.model.handover import window_address
+from viewer.app.handover import window_address
 
 
 @pytest.fixture

@@ -15,12 +15,11 @@ from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
-from viewer.app.picture_files import export_picture, inputs_of_scene, shot_of
+from viewer.app.picture_files import export_picture, inputs_of_scene, read_settings, shot_of
 from viewer.app.saving import checked_path
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
-from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask

@@ -15,11 +15,10 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from viewer.app.jobs import Jobs
-from viewer.app.picture_files import export_picture
+from viewer.app.picture_files import export_picture, read_settings
 from viewer.app.saving import OPEN_PHOTO
 from viewer.model import lens, messages, saving
 from viewer.model.action import ask, do
-from viewer.model.saved_settings import read_settings
 from viewer.model.state.prompts import WRITING, SavePrompt
 from viewer.model.state.tasks import PlainTask, SaveTask
 

@@ -13,11 +13,11 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import rests
+from viewer.app.picture_files import read_settings
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, opening
 from viewer.model.action import ask, do
-from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, SavePrompt
 from viewer.model.state.tasks import PlainTask, SaveTask

@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 
 from tests.viewer.cli.conftest import output_of, refusal_of
+from viewer import version
 from viewer.gpu import context
-from viewer.model import version
 
 ROOT = Path(__file__).parents[3]
 

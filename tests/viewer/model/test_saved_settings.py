@@ -18,12 +18,12 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import scene_of, state_with
+from viewer.app.picture_files import read_settings
 from viewer.model import opening
 from viewer.model.action import do
 from viewer.model.saved_settings import (
     MAX_CHARACTERS,
     left_out_note,
-    read_settings,
     settings_from_text,
     settings_text,
     source_like,

@@ -7,9 +7,9 @@ from imgui_bundle import imgui
 from viewer.model import messages
 from viewer.model.action import Action, ask, do
 from viewer.model.state.tasks import ShowFileTask
-from viewer.model.version import program_commit, program_licence, program_pages, program_version
 from viewer.ui.overlays.prompt_rows import button_rows
 from viewer.ui.widgets import gap, quiet
+from viewer.version import program_commit, program_licence, program_pages, program_version
 
 
 def about_prompt() -> list[Action]:

@@ -1,28 +1,69 @@
-"""Receives, for the window, the paths that later starts of the program hand over, see `viewer.model.handover`."""
+"""Paths that a later start of the program hands over to the open window: the address, the sender and the receiver."""
 
 from __future__ import annotations
 
+import getpass
+import json
 import os
 import socket
 import struct
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Client, Connection, Listener
+from urllib.parse import quote
 
-from viewer.model.handover import MAX_BYTES, TAKEN, paths_from_message, window_address
+from platformdirs import user_runtime_path
 
 if sys.platform != "win32":
     import fcntl
 
+MAX_PATHS = 32
+MAX_BYTES = 1 << 20
+"""Largest message, in bytes: more than MAX_PATHS of the longest paths need."""
+TAKEN = b"taken"
+"""Answer of a window that opens the paths."""
+ANSWER_S = 3.0
+"""Time for the running window to answer, in seconds."""
 READ_S = 1
 """Time for a sender to send its message, in seconds."""
 CLOSE_S = 2.0
 """Time for the thread to end, in seconds."""
 BACKLOG = 16
 """Number of senders that may wait."""
+
+
+def window_address() -> str | None:
+    """Return the address of this user's window on this display; None without a folder that is the user's alone."""
+    if sys.platform == "win32":
+        return rf"\\.\pipe\iibr-{getpass.getuser()}"
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
+    try:
+        folder = user_runtime_path("iibr", appauthor=False, ensure_exists=True)
+        if {folder.lstat().st_uid, folder.parent.lstat().st_uid} != {os.getuid()}:
+            return None
+        folder.chmod(0o700)
+    except OSError:
+        return None
+    return str(folder / f"window{quote(display, safe='')}")
+
+
+def hand_over(paths: Sequence[str]) -> bool:
+    """Let the running window open these absolute paths; return whether it does.
+
+    It opens one, so many need not be sent.
+    """
+    address = window_address()
+    if address is None:
+        return False
+    try:
+        with Client(address) as connection:
+            connection.send_bytes(json.dumps(paths[:MAX_PATHS]).encode())
+            return connection.poll(ANSWER_S) and connection.recv_bytes(len(TAKEN)) == TAKEN
+    except (OSError, EOFError):
+        return False
 
 
 class Receiver:
@@ -71,7 +112,7 @@ class Receiver:
                     self._receive(connection)
 
     def _receive(self, connection: Connection) -> None:
-        paths = paths_from_message(_read(connection))
+        paths = _paths_from_message(_read(connection))
         if paths is not None and not self._is_closed:
             self._received.append(paths)
             self._wake()
@@ -105,3 +146,13 @@ def _read(connection: Connection) -> bytes:
         return connection.recv_bytes(MAX_BYTES) if connection.poll(READ_S) else b""
     except (OSError, EOFError):
         return b""
+
+
+def _paths_from_message(message: bytes) -> tuple[str, ...] | None:
+    """Return the paths in a message, None if it is none: it may come from any program of the user."""
+    try:
+        paths = json.loads(message)
+        are_paths = all(os.path.isabs(path) and b"\0" not in os.fsencode(path) for path in paths)
+    except (ValueError, TypeError, RecursionError):
+        return None
+    return tuple(paths) if are_paths and isinstance(paths, list) and len(paths) <= MAX_PATHS else None

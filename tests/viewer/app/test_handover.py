@@ -11,9 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from viewer.background.receiver import Receiver
-from viewer.cli.open import hand_over
-from viewer.model.handover import MAX_BYTES, MAX_PATHS, window_address
+from viewer.app.handover import MAX_BYTES, MAX_PATHS, Receiver, hand_over, window_address
 
 DEADLINE_S = 30.0
 SHORT = struct.Struct("!i")

@@ -7,7 +7,7 @@ from functools import cache
 from importlib.metadata import metadata, version
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).resolve().parent
 COMMIT_FILE = PACKAGE / "_commit.txt"
 """File that a packaged copy has (`.ci/hatch_build.py`); a checkout asks git."""
 UNKNOWN = "unknown"

@@ -4,7 +4,7 @@ import pytest
 
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
 from iibr_core.types import InputError
-from viewer.model.gloss_file import read_gloss
+from viewer.app.gloss_file import read_gloss
 
 WHOLE = """
 roughness = 0
