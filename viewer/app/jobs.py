@@ -19,20 +19,19 @@ from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource
 from iibr_core.runtime.time_left import TimeLeft
-from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress, stoppable, watched
-from iibr_core.scenes.scene import MAKING, Scene, SceneReady, SceneRequest, ViewReady
+from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable, watched
+from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, ViewReady
 from iibr_core.scenes.scene_gloss import gloss_request, make_maps
-from iibr_core.types import ViewOffset
 from viewer.app.picture_files import inputs_of_scene
 from viewer.background.newest import message_of
 from viewer.background.window_work import Result, Steps, WindowWork
+from viewer.display.making import make_scene
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot, snapshot_of
-from viewer.gpu.refocus.views_seen import views_seen_by
 from viewer.model import saving
 from viewer.model.action import Action, do
 from viewer.model.carried_optics import carry_optics
@@ -254,31 +253,21 @@ class Jobs:
 
     def _make_scene(self, job: Job) -> SceneSnapshot:
         """Open the scene of a job and make the views that its pictures show."""
-        from iibr_core.scenes.opening import results_of
 
-        wanted: set[ViewOffset] | None = None
+        def pictures_of(scene: Scene) -> Iterable[Optics]:
+            optics = job.optics_on(scene)
+            return () if job.needs(scene, optics) == "photo" else job.pictures(scene, optics)
+
+        def upload(made: SceneReady | ViewReady) -> None:
+            if job.snapshot is None:
+                assert isinstance(made, SceneReady)
+                job.snapshot = snapshot_of(self._scene_view.renderer.gl, made)
+            elif isinstance(made, ViewReady):
+                job.snapshot.add(made)
+
         assert job.request is not None
-        with closing(results_of(job.request, lambda: CENTRE, lambda: wanted)) as results:
-            ready = next(results)
-            assert isinstance(ready, SceneReady)
-            snapshot = self._run(job, _in_one_step(lambda: self._open(job, ready)))
-            scene, optics = ready.scene, job.optics_on(ready.scene)
-            if job.needs(scene, optics) == "photo":
-                return snapshot
-            wanted = views_seen_by(job.pictures(scene, optics), scene)
-            for made in results:
-                assert isinstance(made, ViewReady)
-                view = made.view
-                if (view.row, view.column) != scene.grid.centre:
-                    upload = partial(snapshot.field.upload, view.row, view.column, view.colors, view.disparity)
-                    self._run(job, _in_one_step(upload))
-                if made.hidden is not None:
-                    self._run(job, _in_one_step(partial(snapshot.field.set_hidden, made.hidden)))
-                report_progress(made.progress.done, made.progress.total, MAKING)
-        return snapshot
-
-    def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:
-        job.snapshot = snapshot_of(self._scene_view.renderer.gl, ready)
+        make_scene(job.request, lambda made: self._run(job, _in_one_step(partial(upload, made))), pictures_of)
+        assert job.snapshot is not None
         return job.snapshot
 
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:

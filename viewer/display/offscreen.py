@@ -10,12 +10,13 @@ import threading
 from collections.abc import Callable, Collection, Iterable
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.exports.framing import centred, size_in_frame
@@ -23,19 +24,17 @@ from iibr_core.exports.full_picture import is_full
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
 from iibr_core.gloss.settings import Gloss
-from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.lens_choice import LensChoice
-from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
+from iibr_core.scenes.scene import DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, FloatImage
 from viewer.background.maps import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
+from viewer.display.making import PicturesOf, make_scene
 from viewer.display.scene_view import SceneView
 from viewer.display.stereo_view import StereoView
 from viewer.gpu.context import Backend, create_headless
-from viewer.gpu.refocus.views_seen import views_seen_by
 from viewer.model import opening, stereo, window
 from viewer.model.action import Action, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, set_probe
@@ -44,8 +43,6 @@ from viewer.model.state.app_state import AppState
 
 LAYOUT_FRAMES = 3
 """Number of frames until the layout is settled: ImGui knows the size of a text once it was built."""
-PicturesOf = Callable[[Scene], Iterable[Optics] | None]
-"""Function from a scene to the optics of the pictures that will be drawn of it, None if any may be."""
 
 _threads = threading.local()
 
@@ -88,35 +85,26 @@ class OffscreenScene(ExitStack):
         edits: DepthEdits = UNEDITED,
         pictures_of: PicturesOf = lambda scene: None,
     ) -> Scene:
-        """Open a scene and make its views; return the scene.
-
-        edits: edits of its depth. pictures_of: called before the views are made; a photo's views that these pictures
-        do not show are not made. Its exceptions end the opening. Raises InputError.
-        """
-        wanted: set[ViewOffset] | None = None
+        """Open a scene and make its views, see `make_scene`; return the scene. edits: edits of its depth."""
         depth = DepthSettings(source.depth.refine, edits)
         self.state = AppState(depth_strength=depth_strength)
         self.do(do(opening.open_source, source))
         request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth, takes_drafts=False)
-        results = results_of(request, lambda: CENTRE, lambda: wanted)
-        ready = next(results)
-        assert isinstance(ready, SceneReady)
-        self.do(do(opening.show_scene, ready.generation, ready.scene))
-        self.state = replace(self.state, depth=depth)
-        self.view.open(ready)
-        self.inspection.open()
-        pictures = pictures_of(ready.scene)
-        if pictures is not None:
-            wanted = views_seen_by(pictures, ready.scene)
-        for result in results:
-            assert isinstance(result, ViewReady)
-            self.view.add(result.view)
-            self.view.take_hidden(result.hidden)
-            self.inspection.add(result.view)
-            self.view.upload_all()
-            self.do(do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column)))
-            report_progress(result.progress.done, result.progress.total, MAKING)
-        return ready.scene
+        return make_scene(request, partial(self._show, depth), pictures_of)
+
+    def _show(self, depth: DepthSettings, result: SceneReady | ViewReady) -> None:
+        """Upload a scene, which has these settings, or a view of it."""
+        if isinstance(result, SceneReady):
+            self.do(do(opening.show_scene, result.generation, result.scene))
+            self.state = replace(self.state, depth=depth)
+            self.view.open(result)
+            self.inspection.open()
+            return
+        self.view.add(result.view)
+        self.view.take_hidden(result.hidden)
+        self.inspection.add(result.view)
+        self.view.upload_all()
+        self.do(do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column)))
 
     def open_for_export(
         self,

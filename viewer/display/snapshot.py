@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
+from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady, ViewReady
 from iibr_core.types import ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
@@ -28,6 +28,14 @@ class SceneSnapshot:
     field: LightFieldTexture
     gloss: GlossMaps | None = None
     is_free_view: bool = False
+
+    def add(self, made: ViewReady) -> None:
+        """Store a view of the scene."""
+        view = made.view
+        if (view.row, view.column) != self.scene.grid.centre:
+            self.field.upload(view.row, view.column, view.colors, view.disparity)
+        if made.hidden is not None:
+            self.field.set_hidden(made.hidden)
 
     def take_gloss(self, maps: GlossMaps) -> None:
         """Draw gloss with these maps from now on."""
