@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Concatenate, ParamSpec
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
+from iibr_core.scenes.lens_limits import clamp
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import Task
 
 P = ParamSpec("P")
+Value = TypeVar("Value")
+Setter = Callable[[AppState, Value], AppState]
+"""Verb that sets one field."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,18 @@ class Action:
 def do(verb: Callable[Concatenate[AppState, P], AppState], *args: P.args, **kwargs: P.kwargs) -> Action:
     """Return the action that calls `verb(state, *args, **kwargs)`. A type checker compares the arguments."""
     return Action(verb, args, tuple(sorted(kwargs.items())))
+
+
+def setter(path: str, limits: tuple[float, float] | None = None) -> Setter[Any]:
+    """Return the verb that sets a field of the state, or of a record in it as "record.field", within its limits."""
+    record, _, name = path.rpartition(".")
+
+    def verb(state: AppState, value: Any, /) -> AppState:
+        value = value if limits is None else clamp(value, *limits)
+        changed: Any = replace(getattr(state, record), **{name: value}) if record else value
+        return replace(state, **{record or name: changed})
+
+    return verb
 
 
 def ask(state: AppState, task: Task) -> AppState:

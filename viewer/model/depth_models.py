@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.scenes.scene import Scene, source_with_depth
+from viewer.model.action import Setter, setter
 from viewer.model.messages import notify
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
@@ -52,9 +53,8 @@ def offered_model(state: AppState) -> ModelOffer | None:
     return models.recommended if usual is None else model_named(models, usual)
 
 
-def set_known(state: AppState, known: tuple[ModelOffer, ...]) -> AppState:
-    """Set the models that can be had."""
-    return replace(state, models=replace(state.models, known=known))
+set_known: Setter[tuple[ModelOffer, ...]] = setter("models.known")
+"""Set the models that can be had."""
 
 
 def set_downloading(state: AppState, downloading: Downloading | None) -> AppState:

@@ -8,6 +8,7 @@ from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
+from viewer.model.action import Setter, setter
 from viewer.model.layout import Beside
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState, Hover
@@ -45,19 +46,14 @@ class InspectionTextures:
 NO_INSPECTION_TEXTURES = InspectionTextures()
 
 
-def show_epis(state: AppState, is_shown: bool) -> AppState:
-    """Show or hide the epipolar plane images beside the picture."""
-    return replace(state, inspection=replace(state.inspection, shows_epis=is_shown))
-
-
-def show_views(state: AppState, is_shown: bool) -> AppState:
-    """Show or hide the sheet of all views."""
-    return replace(state, inspection=replace(state.inspection, shows_views=is_shown))
-
-
-def show_values(state: AppState, is_shown: bool) -> AppState:
-    """Show or hide the values under the pointer."""
-    return replace(state, inspection=replace(state.inspection, shows_values=is_shown))
+show_epis: Setter[bool] = setter("inspection.shows_epis")
+show_views: Setter[bool] = setter("inspection.shows_views")
+show_values: Setter[bool] = setter("inspection.shows_values")
+"""Show or hide the epipolar plane images beside the picture, the sheet of all views, the values under the pointer."""
+set_opacity: Setter[float] = setter("inspection.opacity", (0.0, 1.0))
+"""Set the opacity of overlays."""
+set_probe: Setter[Probe | None] = setter("inspection.probe")
+"""Set the values under the pointer."""
 
 
 def set_overlay(state: AppState, kind: OverlayKind | None) -> AppState:
@@ -68,11 +64,6 @@ def set_overlay(state: AppState, kind: OverlayKind | None) -> AppState:
     if obstacle:
         return notify(state, Notice(obstacle))
     return replace(state, inspection=replace(state.inspection, overlay=kind, comparison=None))
-
-
-def set_opacity(state: AppState, opacity: float) -> AppState:
-    """Set the opacity of overlays, 0..1."""
-    return replace(state, inspection=replace(state.inspection, opacity=clamp(opacity, 0.0, 1.0)))
 
 
 def compare(state: AppState, kind: Comparison | None) -> AppState:
@@ -111,11 +102,6 @@ def set_hover(state: AppState, hover: Hover | None) -> AppState:
     if hover is None:
         return replace(state, hover=None, inspection=replace(state.inspection, probe=None))
     return replace(state, hover=hover, inspection=replace(state.inspection, place=(hover.x_px, hover.y_px)))
-
-
-def set_probe(state: AppState, probe: Probe | None) -> AppState:
-    """Set the values under the pointer."""
-    return replace(state, inspection=replace(state.inspection, probe=probe))
 
 
 def obstacle_to_overlay(scene: Scene, kind: OverlayKind) -> str:

@@ -6,10 +6,8 @@ Without a scene, or with numbers that are not finite, they change nothing; other
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
-from typing import Concatenate, ParamSpec
+from typing import Any
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import MAX_STROKE_POINTS, STROKE_RADIUS_LIMITS, Gloss, GlossStroke
@@ -17,6 +15,7 @@ from iibr_core.scenes.lens_limits import clamp, clamp_optics, first_aperture, is
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model import focal_plane
+from viewer.model.action import Setter
 from viewer.model.history import record_edit, undoable
 from viewer.model.presets import preset_optics, subject_disparity
 from viewer.model.state.app_state import AppState
@@ -26,8 +25,6 @@ from viewer.model.stroke_path import longer_path
 
 DEPTH_STRENGTH_LIMIT = 4.0
 
-P = ParamSpec("P")
-
 
 def _edited(state: AppState, scene: Scene, optics: Optics) -> AppState:
     """Return the state with these optics, clamped; the same state if a number is not finite."""
@@ -36,13 +33,13 @@ def _edited(state: AppState, scene: Scene, optics: Optics) -> AppState:
     return replace(state, optics=clamp_optics(optics, scene), shows_before=False)
 
 
-def _lens_verb(edit: Callable[Concatenate[Optics, P], Optics]) -> Callable[Concatenate[AppState, P], AppState]:
-    """Return the verb that edits the optics by a function of them."""
+def _lens_setter(name: str) -> Setter[Any]:
+    """Return the verb that sets a field of the optics, see `Optics`."""
 
-    @undoable
-    @wraps(edit)
-    def verb(state: AppState, /, *args: P.args, **kwargs: P.kwargs) -> AppState:
-        return state if state.scene is None else _edited(state, state.scene, edit(state.optics, *args, **kwargs))
+    def verb(state: AppState, value: Any, /) -> AppState:
+        if state.scene is None:
+            return state
+        return record_edit(state, _edited(state, state.scene, replace(state.optics, **{name: value})), name)
 
     return verb
 
@@ -105,16 +102,9 @@ def focus_on(state: AppState, place: focal_plane.Place, disparity: float) -> App
     return record_edit(state, _opened(focused, state.scene), "focus_on", always=True)
 
 
-@_lens_verb
-def set_focus_range(optics: Optics, disparity: float) -> Optics:
-    """Make everything within this much disparity of the focus sharp."""
-    return replace(optics, focus_range=disparity)
-
-
-@_lens_verb
-def set_focus_tilt(optics: Optics, tilt: tuple[float, float]) -> Optics:
-    """Tilt the plane of focus; see `Optics.focus_tilt`."""
-    return replace(optics, focus_tilt=tilt)
+set_focus_range: Setter[float] = _lens_setter("focus_range")
+"""Make everything within this much disparity of the focus sharp."""
+set_focus_tilt: Setter[tuple[float, float]] = _lens_setter("focus_tilt")
 
 
 def show_tilt_handles(state: AppState, is_shown: bool) -> AppState:
@@ -165,22 +155,9 @@ def apply_preset(state: AppState, name: PresetName) -> AppState:
     return _edited(replace(state, has_chosen_aperture=True, tilt_handles=None), state.scene, optics)
 
 
-@_lens_verb
-def set_aperture_shape(optics: Optics, shape: ApertureShape) -> Optics:
-    """Give the aperture a shape."""
-    return replace(optics, aperture_shape=shape)
-
-
-@_lens_verb
-def set_highlights(optics: Optics, share: float) -> Optics:
-    """Let clipped highlights glow; see `Optics.highlight_recovery`."""
-    return replace(optics, highlight_recovery=share)
-
-
-@_lens_verb
-def set_exposure(optics: Optics, stops: float) -> Optics:
-    """Brighten the picture by stops."""
-    return replace(optics, exposure_stops=stops)
+set_aperture_shape: Setter[ApertureShape] = _lens_setter("aperture_shape")
+set_highlights: Setter[float] = _lens_setter("highlight_recovery")
+set_exposure: Setter[float] = _lens_setter("exposure_stops")
 
 
 def show_before(state: AppState, is_shown: bool) -> AppState:
@@ -205,10 +182,8 @@ def requested_strength(state: AppState) -> float:
 # Gloss
 
 
-@_lens_verb
-def set_gloss(optics: Optics, gloss: Gloss | None) -> Optics:
-    """Make a surface glossy; None: no surface."""
-    return replace(optics, gloss=gloss)
+set_gloss: Setter[Gloss | None] = _lens_setter("gloss")
+"""Make a surface glossy; None: no surface."""
 
 
 def take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:

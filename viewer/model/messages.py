@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from viewer.model.action import Setter, setter
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import Prompt
@@ -29,6 +30,5 @@ def show_details(state: AppState, notice: Notice) -> AppState:
     return replace(state, notices=tuple(detailed if other == notice else other for other in state.notices))
 
 
-def show_prompt(state: AppState, prompt: Prompt | None) -> AppState:
-    """Show a prompt in place of any other, or as the user has edited it; None closes it."""
-    return replace(state, prompt=prompt)
+show_prompt: Setter[Prompt | None] = setter("prompt")
+"""Show a prompt in place of any other, or as the user has edited it; None closes it."""

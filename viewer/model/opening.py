@@ -15,6 +15,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source, source_with_depth
 from iibr_core.types import InputError
+from viewer.model.action import Setter, setter
 from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, with_focus_of
 from viewer.model.demo_photo import is_ours
 from viewer.model.depth_models import offered_model
@@ -173,19 +174,15 @@ def focus_again(state: AppState, place: tuple[float, float], disparity: float) -
     return replace(state, optics=optics, chosen_focus=optics.focus_disparity, focused_at=place)
 
 
-def set_facts(state: AppState, facts: PhotoFacts) -> AppState:
-    """Show the facts that a photo's file states."""
-    return replace(state, facts=facts)
+set_facts: Setter[PhotoFacts] = setter("facts")
+"""Show the facts that a photo's file states."""
+set_existing_recent: Setter[tuple[str, ...]] = setter("existing_recent")
+"""Offer those recent files that exist."""
 
 
 def with_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
     """Return the recent paths with this one first."""
     return (path, *(other for other in recent if other != path))[:MAX_RECENT]
-
-
-def set_existing_recent(state: AppState, paths: tuple[str, ...]) -> AppState:
-    """Offer those recent files that exist."""
-    return replace(state, existing_recent=paths)
 
 
 def other_recent(state: AppState) -> tuple[str, ...]:

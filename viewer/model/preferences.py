@@ -4,36 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.scenes.lens_limits import clamp
+from viewer.model.action import Setter, setter
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import Section, Theme, Units, is_seen_open, with_sections
 
 FONT_SCALE_LIMITS = 0.6, 2.5
 
 
-def set_theme(state: AppState, theme: Theme) -> AppState:
-    """Show the panels in these colours."""
-    return replace(state, preferences=replace(state.preferences, theme=theme))
-
-
-def set_font_scale(state: AppState, scale: float) -> AppState:
-    """Scale text and widgets by a factor."""
-    return replace(state, preferences=replace(state.preferences, font_scale=clamp(scale, *FONT_SCALE_LIMITS)))
-
-
-def set_units(state: AppState, units: Units) -> AppState:
-    """Show distances and apertures in these units."""
-    return replace(state, preferences=replace(state.preferences, units=units))
-
-
-def show_filmstrip(state: AppState, is_shown: bool) -> AppState:
-    """Show or hide the filmstrip."""
-    return replace(state, preferences=replace(state.preferences, shows_filmstrip=is_shown))
-
-
-def guess_depth_always(state: AppState, is_wanted: bool) -> AppState:
-    """Decide whether photos without depth keep a guess although a model is here."""
-    return replace(state, preferences=replace(state.preferences, guesses_depth=is_wanted))
+set_theme: Setter[Theme] = setter("preferences.theme")
+set_font_scale: Setter[float] = setter("preferences.font_scale", FONT_SCALE_LIMITS)
+"""Set the factor of text and widgets."""
+set_units: Setter[Units] = setter("preferences.units")
+show_filmstrip: Setter[bool] = setter("preferences.shows_filmstrip")
+guess_depth_always: Setter[bool] = setter("preferences.guesses_depth")
+"""Decide whether photos without depth keep a guess although a model is here."""
 
 
 def toggle_section(state: AppState, section: Section) -> AppState:

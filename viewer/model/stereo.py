@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
+from viewer.model.action import Setter, setter
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -86,14 +88,10 @@ def swap_eyes(state: AppState) -> AppState:
     return replace(state, preferences=replace(state.preferences, swaps_eyes=not state.preferences.swaps_eyes))
 
 
-def set_eyes(state: AppState, eyes: float) -> AppState:
-    """Set the distance of the eyes, in view steps."""
-    return replace(state, stereo=replace(state.stereo, eyes=max(eyes, 0.0)))
-
-
-def set_screen(state: AppState, disparity: float) -> AppState:
-    """Set the disparity that lies in the plane of the screen."""
-    return replace(state, stereo=replace(state.stereo, screen=disparity))
+set_eyes: Setter[float] = setter("stereo.eyes", (0.0, math.inf))
+"""Set the distance of the eyes, in view steps."""
+set_screen: Setter[float] = setter("stereo.screen")
+"""Set the disparity that lies in the plane of the screen."""
 
 
 def _same(monitor: Monitor | None, among: tuple[Monitor, ...]) -> Monitor | None:

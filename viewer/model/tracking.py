@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from iibr_core.scenes.lens_limits import clamp, clamp_eye, eye_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError, ViewOffset
+from viewer.model.action import Setter, setter
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -122,10 +123,8 @@ def switch(state: AppState, address: str | None) -> AppState:
     return replace(state, tracking=Tracking(address), preferences=replace(state.preferences, tracker=address))
 
 
-def set_head_range(state: AppState, range_cm: float) -> AppState:
-    """Set the movement of the head from the middle to the outermost views, in cm."""
-    range_cm = clamp(range_cm, *HEAD_RANGE_LIMITS)
-    return replace(state, preferences=replace(state.preferences, head_range_cm=range_cm))
+set_head_range: Setter[float] = setter("preferences.head_range_cm", HEAD_RANGE_LIMITS)
+"""Set the movement of the head from the middle to the outermost views, in cm."""
 
 
 def set_receiving(state: AppState, is_receiving: bool) -> AppState:

@@ -8,6 +8,7 @@ from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.loops import LoopKind, ease, point_on_loop
 from iibr_core.scenes.lens_limits import clamp, clamp_optics
 from iibr_core.types import GridShape, ViewOffset
+from viewer.model.action import Setter, setter
 from viewer.model.history import record_edit
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
@@ -65,9 +66,8 @@ def set_loop(state: AppState, kind: LoopKind | None) -> AppState:
     return record_edit(state, replace(state, motion=_start(state, kind)), "set_loop", always=True)
 
 
-def set_speed(state: AppState, turns_per_second: float) -> AppState:
-    """Set the speed of loops."""
-    return replace(state, motion=replace(state.motion, speed=clamp(turns_per_second, *SPEED_LIMITS)))
+set_speed: Setter[float] = setter("motion.speed", SPEED_LIMITS)
+"""Set the speed of loops, in turns per second."""
 
 
 def pause(state: AppState, is_paused: bool) -> AppState:
@@ -100,9 +100,8 @@ def leave_camera(state: AppState) -> AppState:
     return replace(state, free_camera=None)
 
 
-def report_camera(state: AppState, done: float | None) -> AppState:
-    """Show the progress of preparing the free camera's views, as a share; None when they are ready."""
-    return replace(state, free_progress=done)
+report_camera: Setter[float | None] = setter("free_progress")
+"""Show the progress of preparing the free camera's views, as a share; None when they are ready."""
 
 
 def set_zoom(state: AppState, zoom: Zoom | None) -> AppState:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.scenes.screen_size import ScreenSize
+from viewer.model.action import Setter, setter
 from viewer.model.inspection import beside_of
 from viewer.model.layout import Layout, layout_of
 from viewer.model.state.app_state import AppState, DrawReport
@@ -24,14 +25,10 @@ def toggle_panel(state: AppState) -> AppState:
     return usual if usual.is_panel_hidden == hides else replace(state, hides_panel=hides)
 
 
-def set_narrow(state: AppState, is_narrow: bool) -> AppState:
-    """Note whether the window is too narrow for a panel beside the picture."""
-    return replace(state, is_narrow=is_narrow)
-
-
-def set_report(state: AppState, report: DrawReport | None) -> AppState:
-    """Note how the last picture was drawn."""
-    return replace(state, report=report)
+set_narrow: Setter[bool] = setter("is_narrow")
+"""Note whether the window is too narrow for a panel beside the picture."""
+set_report: Setter[DrawReport | None] = setter("report")
+"""Note how the last picture was drawn."""
 
 
 def layout_for(state: AppState, size: ScreenSize, pixel_ratio: float, ui_scale: float) -> Layout:
