@@ -88,9 +88,10 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer):
 def test_the_number_of_views_of_a_light_field_is_set_in_the_prompt(viewer):
     viewer.do(do(messages.show_prompt, ExportPrompt("hci", "field")))
     viewer.press("##views", "prompt ExportPrompt")
-    viewer.type("5")
-    prompt = viewer.app.state.prompt
-    assert prompt.options == ExportOptions(grid=GridShape(5, 5))
+    viewer.type("7")
+    viewer.send("key", "Tab")
+    wanted = ExportPrompt("hci", "field", ExportOptions(grid=GridShape(7, 7)))
+    viewer.until(lambda app: app.state.prompt == wanted)
 
 
 def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer):
