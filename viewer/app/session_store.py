@@ -19,6 +19,7 @@ from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.model import messages, opening
 from viewer.model.action import Action, do
+from viewer.model.look import paste_look
 from viewer.model.remedies import words_of
 from viewer.model.saving import settings_of
 from viewer.model.state.app_state import AppState
@@ -51,7 +52,15 @@ class SessionStore:
         self._has_failed = False
 
     def advance(self, state: AppState) -> list[Action]:
-        """Look for the session of a scene that was just opened, and write what was changed a while ago."""
+        """Look for the session of a scene that was just opened, and write what was changed a while ago.
+
+        A look that the photo is to have comes after its session.
+        """
+        actions, wanted_for = self._sessions(state), state.look and state.look.wanted_for
+        is_ready = state.scene is not None and state.scene.source is wanted_for and not state.scene.is_sketch
+        return [do(paste_look)] if is_ready and self._search is None and not actions else actions
+
+    def _sessions(self, state: AppState) -> list[Action]:
         if self._folder is None:
             return []
         actions, scene = self._take_search(state) + self._report_failure(), state.scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
+from viewer.model import folder
 from viewer.model.history import undoable
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
@@ -26,6 +27,14 @@ def copy_look(state: AppState) -> AppState:
     return notify(replace(state, look=look), Notice(COPIED, is_result=True))
 
 
+def paste_look_to(state: AppState, steps: int) -> AppState:
+    """Give the photo `steps` after the open one the look that was copied: open it first, unless it is open."""
+    if state.look is None or steps == 0:
+        return paste_look(state)
+    opened = folder.step(state, steps)
+    return opened if opened is state else replace(opened, look=replace(state.look, wanted_for=opened.source))
+
+
 @undoable
 def paste_look(state: AppState) -> AppState:
     """Give the open picture the look that was copied; viewpoint, focus, gloss and strokes stay its own."""
@@ -43,6 +52,7 @@ def paste_look(state: AppState) -> AppState:
         exposure_stops=look.optics.exposure_stops,
     )
     state = replace(state, optics=clamp_optics(optics, scene), has_chosen_aperture=True, shows_before=False)
+    state = replace(state, look=replace(look, wanted_for=None))
     depth = replace(state.depth, edits=replace(look.tone, strokes=state.depth.edits.strokes))
     if scene.plan is None or (depth, look.depth_strength) == (state.depth, state.depth_strength):
         return state

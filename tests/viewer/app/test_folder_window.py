@@ -5,13 +5,14 @@ import threading
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from PIL import ImageGrab
 
 from iibr_core.scenes.scene import Source, WantedPhoto
 from iibr_core.types import GridShape
 from tests.iibr_core.scenes.test_opening import write_large_photo
 from tests.viewer.conftest import write_scene
-from viewer.model import folder
+from viewer.model import folder, history, lens, look
 from viewer.model.action import do
 
 
@@ -106,6 +107,27 @@ def test_the_filmstrip_shows_all_photos_and_opens_one(viewer, tmp_path):
     viewer.press("photo photo2.png", "filmstrip")
     viewer.until_idle()
     assert viewer.app.state.generation == generation, "a click on the open photo changes nothing"
+
+
+@pytest.mark.usefixtures("wide_window")
+def test_the_menu_of_another_photo_gives_it_the_look_that_was_copied(viewer):
+    shows(viewer, "photo0")
+    viewer.app.do(do(lens.set_exposure, 1.0), do(look.copy_look), do(lens.set_exposure, 0.0))
+    viewer.find("photo photo2.png", "filmstrip")
+    viewer.send("click", 3)
+    name = f"##Popup_{imgui.internal.find_window_by_name('filmstrip').get_id('menu 2'):08x}"
+    viewer.until(lambda app: imgui.internal.find_window_by_name(name) is not None)
+    viewer.until_idle()
+    menu = imgui.internal.find_window_by_name(name)
+    viewer.send("mousemove", round(menu.pos.x + 30), round(menu.pos.y + 0.7 * menu.size.y))
+    viewer.app.step()
+    viewer.send("click", 1)
+    shows(viewer, "photo2")
+    viewer.until(lambda app: app.state.optics.exposure_stops == 1.0)
+    viewer.app.do(do(history.undo))
+    assert viewer.app.state.optics.exposure_stops == 0.0
+    viewer.until_idle()
+    assert viewer.app.state.optics.exposure_stops == 0.0, "it comes once"
 
 
 def test_no_thread_is_left_when_the_window_closes(viewer):

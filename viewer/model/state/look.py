@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.scenes.scene import Source
 
 
 @dataclass(frozen=True)
 class Look:
     """A look that was copied. aperture_share: of the widest aperture; range_share: of all depth, for the sharp range.
 
-    tone: clips, gamma and inversion of the depth, without strokes.
+    tone: clips, gamma and inversion of the depth, without strokes. wanted_for: photo that is being opened to have it.
     """
 
     optics: Optics
@@ -20,3 +21,4 @@ class Look:
     range_share: float
     tone: DepthEdits
     depth_strength: float
+    wanted_for: Source | None = None

@@ -8,7 +8,7 @@ from pathlib import PurePath
 from imgui_bundle import imgui
 
 from iibr_core.scenes.rect import Rect
-from viewer.model import folder
+from viewer.model import folder, look
 from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
@@ -18,6 +18,8 @@ from viewer.ui.widgets import scale, tooltip
 
 CELL_ASPECT = 1.5
 GAP = 6.0
+COPY_LOOK, PASTE_LOOK = "Copy the look of the open photo", "Paste the look to this photo"
+"""Entries of a photo's menu."""
 WORDS_SIZE = 0.85
 """Size of words in a cell relative to the usual text."""
 _FLAGS = (
@@ -39,7 +41,7 @@ def filmstrip_paths(state: AppState, layout: Layout) -> tuple[str, ...]:
 
 
 def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnail | None]) -> list[Action]:
-    """Build the row. A click opens a photo, the wheel scrolls; an unreadable photo shows its name."""
+    """Build the row: a click opens a photo, the right button its menu, the wheel scrolls. Damaged ones show a name."""
     rect, photos = layout.filmstrip, state.folder
     if rect is None or photos is None:
         return []
@@ -56,11 +58,29 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
         thumbnail, is_readable = thumbnails.get(path), name not in photos.unreadable
         if photo_cell(cell, name, thumbnail, palette, i == place) and place is not None and is_readable:
             actions.append(do(folder.step, i - place))
+        if place is not None:
+            actions += _menu(cell, i - place, state)
         if thumbnail is None and (path in thumbnails or not is_readable):
             write_in_cell(cell, f"Cannot be read: {name}", palette)
     if imgui.is_window_hovered() and (wheel := imgui.get_io().mouse_wheel):
         actions.append(do(folder.scroll, -round(wheel) or (-1 if wheel > 0 else 1)))
     imgui.end()
+    imgui.pop_style_var()
+    return actions
+
+
+def _menu(cell: Rect, steps: int, state: AppState) -> list[Action]:
+    """Build the menu of a photo, which a click with the right button opens. steps: from the open photo to this one."""
+    name, actions = f"menu {steps}", []
+    if imgui.is_mouse_clicked(imgui.MouseButton_.right) and imgui.is_mouse_hovering_rect(*corners(cell)):
+        imgui.open_popup(name)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(GAP * scale(), GAP * scale()))
+    if imgui.begin_popup(name):
+        if imgui.menu_item(COPY_LOOK, "", False, state.scene is not None)[0]:
+            actions.append(do(look.copy_look))
+        if imgui.menu_item(PASTE_LOOK, "", False, state.look is not None)[0]:
+            actions.append(do(look.paste_look_to, steps))
+        imgui.end_popup()
     imgui.pop_style_var()
     return actions
 
