@@ -15,7 +15,7 @@ from iibr_core.method.look_up import KEYS_A, keys_weights
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar
 from iibr_core.runtime.tiling import in_bands
-from iibr_core.types import FloatImage, ImageSize, ViewOffset
+from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 ON_SURFACE_ROUNDS = 5
 """Number of steps in which a ray is followed to its surface if a range of disparities is in focus."""
@@ -45,7 +45,7 @@ class LensSum:
 
         disparity: that of the view (H, W), px per view step; needed if the optics have a focus range.
         """
-        optics, light = self._optics, np.empty(colors.shape, np.float32)
+        optics = self._optics
         camera = offset.t - optics.eye.t, offset.s - optics.eye.s
         focus_range = 0.0 if disparity is None else max(optics.focus_range, 0.0)
         surface = np.zeros((1, 1), np.float32) if disparity is None else disparity
@@ -55,13 +55,20 @@ class LensSum:
         def shear(first: int, last: int) -> None:
             _add_sheared(light, surface, camera, weight, focus, barrel, (first, last), (self._sum, self._weights))
 
-        in_bands(lambda first, last: _linear_rows(colors, self._gain, first, last, light), self._size)
+        light = light_of(colors, self._gain)
         in_bands(shear, self._size)
 
     def light(self) -> FloatImage:
         """Return the picture of the views added so far, linear light (H, W, 3), exposed; not cut off at white."""
         exposure = np.float32(2.0**self._optics.exposure_stops)
         return np.asarray(self._sum * (exposure / np.maximum(self._weights, np.float32(1e-9)))[..., None])
+
+
+def light_of(colors: FloatImage, gain: float) -> FloatImage:
+    """Return the linear light (H, W, 3) of encoded colours; what clips in all channels is 1 + gain times as bright."""
+    light = np.empty(colors.shape, np.float32)
+    in_bands(lambda first, last: _linear_rows(colors, gain, first, last, light), image_size(colors))
+    return light
 
 
 def _barrel(optics: Optics, size: ImageSize) -> tuple[float, float, float]:

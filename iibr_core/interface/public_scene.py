@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypedDict, Unpack, get_args
@@ -20,7 +21,7 @@ from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views, row_step_of
 from iibr_core.formats.maps.disparity_file import map_at_size
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
-from iibr_core.interface.fields import LightField, MakeView, View, gather
+from iibr_core.interface.fields import LensViews, LightField, MakeView, View, gather
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.work import (
     ReportProgress,
@@ -32,7 +33,8 @@ from iibr_core.runtime.work import (
     watched,
 )
 from iibr_core.scenes.light_fields import open_settled, read_dense
-from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, view_maker_of
+from iibr_core.scenes.opening import scene_of_photo
+from iibr_core.scenes.photo import lens_views_of, load_photo, make_plan, photo_of_arrays, view_maker_of
 from iibr_core.scenes.scene import MAKING, READING, LoadedPhoto, Source
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
@@ -55,12 +57,13 @@ class ViewOptions(TypedDict, total=False):
 class _Making(NamedTuple):
     """The views of a grid, as they come.
 
-    view_between: makes views between them, None if nothing does. row_step: see `LightField`.
+    view_between: makes views between them, None if nothing does; lens: those inside a lens. row_step: see `LightField`.
     """
 
     grid: GridShape
     views: Iterator[View]
     view_between: MakeView | None = None
+    lens: LensViews | None = None
     doing: str = MAKING
     row_step: float = 1.0
 
@@ -106,7 +109,8 @@ class Scene(ABC):
         with stoppable(should_stop), watched(report_progress):
             making = self._make(_grid_shape(grid), **options)
         views = making.watched(should_stop, report_progress)
-        return gather(views, making.grid, self.focal_px, self.name, making.row_step, making.view_between)
+        field = gather(views, making.grid, self.focal_px, self.name, making.row_step)
+        return replace(field, _view_between=making.view_between, _lens=making.lens)
 
     def views(
         self,
@@ -166,7 +170,8 @@ class PhotoScene(Scene):
         source, plan = self._planned(grid, parallax, depth_strength, inpaint)
         maker = view_maker_of(source, self._loaded, plan)
         views = maker.generate(plan.grid, self._loaded.photo.is_hdr)
-        return _Making(plan.grid, views, lambda offset: maker.view(offset).colors)
+        lens = LensViews(scene_of_photo(source, self._loaded, plan), partial(lens_views_of, source, self._loaded, plan))
+        return _Making(plan.grid, views, lambda offset: maker.view(offset).colors, lens)
 
 
 class FieldScene(Scene):

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.color import photo_in_srgb
+from iibr_core.beyond.lens import light_of
+from iibr_core.beyond.optics import Optics
+from iibr_core.color import photo_in_srgb, srgb_from_linear
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import DepthCanvas
@@ -24,10 +26,11 @@ from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.light_field import ViewMaker, view_maker
 from iibr_core.method.plan import MAX_DEPTH_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
+from iibr_core.method.view import View
 from iibr_core.runtime.kernels import KERNELS_OF_A_PHOTO, kernel_count
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
-from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
 
 SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
@@ -163,6 +166,26 @@ def view_maker_of(source: Source, loaded: LoadedPhoto, plan: ScenePlan, in_srgb:
     photo = photo_in_srgb(loaded.photo) if in_srgb else loaded.photo
     disparity, estimate_depth = plan.field_disparity(loaded.disparity), depth_estimator(source, loaded)
     return view_maker(photo, disparity, plan, source.inpaint, estimate_depth)
+
+
+def lens_views_of(
+    source: Source, loaded: LoadedPhoto, plan: ScenePlan, optics: Optics, reach: float
+) -> Callable[[ViewOffset], View]:
+    """Return a maker of the photo's sRGB views up to `reach` view steps away, as a lens needs them.
+
+    What is in focus does not move, so it is as sharp as in the photo; clipped highlights are recovered.
+    """
+    field, photo, side = plan.field_disparity(loaded.disparity), photo_in_srgb(loaded.photo), 2 * math.ceil(reach) + 1
+    gain = optics.highlight_gain(optics.aperture_diameter, photo.is_hdr)
+    if gain > 0:
+        photo = replace(photo, pixels=srgb_from_linear(light_of(photo.pixels, gain)))
+    return view_maker(
+        photo,
+        replace(field, values=field.values - np.float32(optics.focus_disparity)),
+        replace(plan, grid=GridShape(*(max(views, side) for views in plan.grid))),
+        source.inpaint,
+        depth_estimator(source, loaded),
+    ).view
 
 
 def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:

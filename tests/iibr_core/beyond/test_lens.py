@@ -8,7 +8,7 @@ from scipy.ndimage import map_coordinates
 from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights, views_in_aperture
 from iibr_core.beyond.lens import LensSum
 from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
-from iibr_core.color import linear_from_srgb
+from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -77,6 +77,24 @@ def test_clipped_pixels_and_exposure_count_for_more() -> None:
     light = light_of(optics, (CENTRE, view))
     np.testing.assert_allclose(light[20, 30], 2 * (1 + HIGHLIGHT_GAIN), rtol=1e-4)
     np.testing.assert_allclose(light[5, 5], 2 * linear_from_srgb(view[5, 5]), rtol=1e-4)
+
+
+def test_light_above_white_counts_as_it_is_and_recovery_adds_none():
+    """HDR views are not clipped: a lamp 12 times as bright as white in half of the views is 6 times as bright."""
+    bright, dark = (np.full((*SIZE, 3), srgb_from_linear(np.float32(level)), np.float32) for level in (12.0, 0.0))
+    for recovery in (0.0, 1.0):
+        lens = LensSum(Optics(aperture_diameter=2.0, highlight_recovery=recovery), SIZE, is_hdr=True)
+        lens.add(CENTRE, bright)
+        lens.add(CENTRE, dark)
+        np.testing.assert_allclose(lens.light(), 6.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("diameter", "factor"), [(0.0, 1.0), (0.5, 8.5), (1.0, 16.0), (9.0, 16.0)])
+def test_recovery_makes_clipped_light_up_to_16_times_as_bright(diameter, factor):
+    """Less in a lens that is nearly closed, in which nothing blooms."""
+    lens = LensSum(Optics(aperture_diameter=diameter, highlight_recovery=1.0), SIZE)
+    lens.add(CENTRE, np.ones((*SIZE, 3), np.float32))
+    np.testing.assert_allclose(lens.light(), factor, rtol=1e-4)
 
 
 def test_the_barrel_cuts_cameras_off_toward_the_corners() -> None:

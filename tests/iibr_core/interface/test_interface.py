@@ -13,9 +13,13 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.inpainting.registry import INPAINTERS
+from iibr_core.interface.fields import LensViews
 from iibr_core.method.light_field import generate
 from iibr_core.method.plan import plan_literal
-from iibr_core.types import Disparity, GridShape, InputError, Photo, ViewOffset
+from iibr_core.method.view import View as MadeView
+from iibr_core.scenes.scene import Scene as OpenScene
+from iibr_core.scenes.scene import Source
+from iibr_core.types import Disparity, GridShape, InputError, Photo
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import square_before_wall
 
@@ -106,9 +110,9 @@ def test_views_between_and_refocusing_inpaint_as_the_stored_views_do(monkeypatch
     asked = len(offsets)
     assert stored > 20
     assert red_pixels(field.view(1.999, 0)) == pytest.approx(stored, abs=3)
+    assert all(max(map(abs, offset)) < 2 for offset in offsets[asked:]), "no corner view is made again"
     reddish = field.refocus(0.0, 4.0)
     assert (reddish[..., 0] - reddish[..., 1:].max(axis=-1)).max() > 0.4
-    assert all(max(map(abs, offset)) < 2 for offset in offsets[asked:]), "no corner view is made again"
 
 
 def test_refocusing_is_the_mean_of_the_views_inside_the_aperture() -> None:
@@ -126,25 +130,53 @@ def test_refocusing_is_the_mean_of_the_views_inside_the_aperture() -> None:
 
 
 @pytest.mark.parametrize(
-    ("disparity", "aperture", "count"),
-    [(None, 1.0, 256), (6.0, 0.5, 16), (6.0, 2.0, 40), (6.0, 9.0, 60), (99.0, 2.0, 256)],
+    ("disparity", "options", "count"),
+    [
+        (None, {"aperture": 1.0}, 256),
+        (6.0, {"aperture": 0.5}, 16),
+        (6.0, {"aperture": 2.0}, 40),
+        (6.0, {"aperture": 9.0}, 180),
+        (6.0, {"aperture": 2.0, "tilt": (1.0, -2.0)}, 64),
+        (99.0, {"aperture": 2.0}, 256),
+        (99.0, {"aperture": 2.0, "cameras": 40}, 40),
+    ],
 )
-def test_a_wider_blur_takes_more_views(disparity, aperture, count) -> None:
-    """4 for each pixel of blur of the middle view, 16 to 256; the aperture ends at the grid's border."""
+def test_a_wider_blur_takes_more_views(disparity, options, count):
+    """4 for each pixel of blur of the middle view, 16 to 256, or as many as asked for; also beyond the grid."""
     made = []
 
-    def view(offset: ViewOffset) -> np.ndarray:
+    def view(offset):
         made.append(offset)
-        return np.full((4, 4, 3), 0.5, np.float32)
+        grey = np.full((4, 4, 3), 0.5, np.float32)
+        return MadeView(grey, grey[..., 0], np.zeros((4, 4), bool), np.zeros((4, 4), bool))
 
     views = np.zeros((3, 3, 4, 4, 3), np.uint8)
     known = None if disparity is None else np.zeros((3, 3, 4, 4), np.float32)
     if known is not None:
         known[1, 1, 2, 2] = disparity
-    field = iibr.LightField(views, known, None, 4.0, _view_between=view)
-    np.testing.assert_allclose(field.refocus(1.0, aperture), 0.5, atol=1e-3)
+    scene = OpenScene(Source(""), "a", 4, 4, GridShape(3, 3), (0.0, disparity or 0.0), "")
+    lens = LensViews(scene, lambda focus, reach: view)
+    field = iibr.LightField(views, known, None, 4.0, _lens=lens)
+    np.testing.assert_allclose(field.refocus(1.0, **options), 0.5, atol=1e-3)
     assert count - 2 <= len(made) <= count
-    assert np.abs(made).max() <= min(aperture / 2, 1.6)
+    radius = options["aperture"] / 2
+    assert 0.8 * radius < np.hypot(*np.array(made).T).max() <= radius * 1.001
+
+
+def test_refocusing_reports_progress_and_stops():
+    field, reports = iibr.from_arrays(*square_scene()).light_field(3), []
+    field.refocus(0.0, 1.0, 20, report_progress=lambda done, total, doing: reports.append((doing, done, total)))
+    doing, done, total = reports[-1]
+    assert (doing, done) == ("refocusing", total - 1)
+    assert [each[1] for each in reports if each[0] == "refocusing"] == list(range(total))
+    with pytest.raises(iibr.Cancelled):
+        field.refocus(0.0, 1.0, should_stop=lambda: True)
+
+
+def test_choices_of_the_lens_that_change_nothing_warn():
+    field = iibr.from_arrays(*square_scene()).light_field(3)
+    with pytest.warns(UserWarning, match="closed lens shows nothing of shape"):
+        field.refocus(aperture=0.0, blades=5)
 
 
 @pytest.mark.parametrize("format", iibr.FORMATS)
@@ -197,6 +229,7 @@ def test_pictures_of_all_kinds_of_numbers_are_taken() -> None:
     assert iibr.compare(pixels, pixels + 0.1).psnr_db == pytest.approx(20, abs=0.01)
 
 
+ONE_VIEW = np.zeros((1, 1, 6, 8, 3), np.uint8)
 BAD = {
     "a disparity of another size": lambda p, d: iibr.from_arrays(p, d[1:]),
     "a grey photo": lambda p, d: iibr.from_arrays(p[..., 0], d),
@@ -208,6 +241,10 @@ BAD = {
     "another parallax": lambda p, d: iibr.from_arrays(p, d).light_field(3, parallax="wide"),
     "a view outside": lambda p, d: iibr.from_arrays(p, d).light_field(3).view(1.5, 0),
     "a negative aperture": lambda p, d: iibr.from_arrays(p, d).light_field(3).refocus(0, -1),
+    "two places in focus": lambda p, d: iibr.from_arrays(p, d).light_field(3).refocus(0.0, at=(1, 1)),
+    "a place outside": lambda p, d: iibr.from_arrays(p, d).light_field(3).refocus(at=(80, 1), f_number=2),
+    "an f-number without depth": lambda p, d: iibr.LightField(ONE_VIEW, None, None, 8.0).refocus(f_number=2),
+    "a lens wider than stored views": lambda p, d: iibr.LightField(ONE_VIEW, None, None, 8.0).refocus(0.0, 1.1),
     "pictures of two sizes": lambda p, d: iibr.compare(p, p[1:]),
     "a photo that is not there": lambda p, d: iibr.open("nowhere.png"),
     "literal with a strength": lambda p, d: iibr.from_arrays(p, d).light_field(3, parallax="literal", depth_strength=2),
