@@ -3,9 +3,11 @@
 
 import { NUMBERS, tentsOf } from "./slices.js";
 
-const TILE_PX = 512, MAX_ATLAS_PX = 4096, BLOCK_PX = 32, MAX_REACH_BLOCKS = 7, BINS = 128, BARREL_EDGE = 1 / 16;
+const TILE_PX = 512, MAX_ATLAS_PX = 4096, BLOCK_PX = 16, MAX_REACH_BLOCKS = 12, ALIGNED_PX = 4, BINS = 128;
+const BARREL_EDGE = 1 / 16;
 const SURFACES = ["FRINGE", "", "BEHIND"];
 const both = (of) => [of(0), of(1)];
+const multiple = (x, step) => step * Math.ceil(x / step);
 
 export class Discs {
     constructor(renderer) {
@@ -18,9 +20,9 @@ export class Discs {
         const { lens: { slices }, width, height } = picture;
         this.picture = picture;
         this.tents = tentsOf(slices);
-        const farthest = Math.max(...slices.map(({ reachPx, level }) => reachPx + 2 * 2 ** level));
-        this.blockPx = BLOCK_PX;
-        while (farthest > (MAX_REACH_BLOCKS - 1) * this.blockPx) this.blockPx *= 2;
+        this.reachPx = slices.map(({ reachPx, level }) => reachPx + 2 ** level);
+        this.blockPx = Math.max(BLOCK_PX, ...slices.map(({ level }) => 2 ** level));
+        while (Math.max(...this.reachPx) > MAX_REACH_BLOCKS * this.blockPx) this.blockPx *= 2;
         this.writeTaps(slices);
         this.drawSurfaces(picture);
         this.drawOccupancy(picture);
@@ -33,7 +35,7 @@ export class Discs {
     }
 
     writeTaps(slices) {
-        const { gl } = this.renderer, table = new Float32Array(4 * NUMBERS.MAX_TAPS * NUMBERS.MAX_SLICES);
+        const { gl } = this.renderer, table = new Float32Array(4 * NUMBERS.MAX_TAPS * slices.length);
         slices.forEach(({ taps }, i) => taps.forEach((tap, j) => table.set(tap, 4 * (i * NUMBERS.MAX_TAPS + j))));
         gl.bindBuffer(gl.UNIFORM_BUFFER, this.taps);
         gl.bufferData(gl.UNIFORM_BUFFER, table, gl.DYNAMIC_DRAW);
@@ -43,7 +45,7 @@ export class Discs {
         const { renderer } = this, { gl, hidden } = renderer, { width, height } = region;
         const size = [width, SURFACES.length * height];
         const light = renderer.sheet("light", gl.RGBA16F, ...size, ["light", "defocus"]);
-        renderer.sheet("defocus", gl.R16F, ...size, ["light", "defocus"]);
+        renderer.sheet("defocus", renderer.isFloat ? gl.R32F : gl.R16F, ...size, ["light", "defocus"]);
         renderer.clear(light);
         SURFACES.forEach((name, i) => {
             if (name === "BEHIND" && !hidden) return;
@@ -68,13 +70,18 @@ export class Discs {
         }, 0));
         const values = { ...this.area(), "bins[0]": bins, bin_of: [scale, 1 - far * scale], block_px: blockPx };
         renderer.draw(["occupancy.frag"], target, values, this.surfaces());
+        const wanted = Array.from({ length: MAX_REACH_BLOCKS }, (_, away) => (
+            this.reachPx.reduce((bits, px, i) => bits | (px > away * blockPx ? 1 << i : 0), 0)));
+        const reached = renderer.sheet("reach", gl.R32UI, blocks(region.width), blocks(region.height));
+        const reach = Math.ceil(Math.max(...this.reachPx) / blockPx);
+        renderer.draw(["reach.frag"], reached, { "wanted[0]": wanted, reach }, { occupancy: target });
     }
 
     area = () => ({ area: [this.picture.region.width, this.picture.region.height] });
 
     surfaces() {
-        const { light, defocus, occupancy } = this.renderer.sheets;
-        return { surfaces: light, defocus, occupancy };
+        const { light, defocus } = this.renderer.sheets;
+        return { surfaces: light, defocus };
     }
 
     // start, end: corners of the tile, px of the picture.
@@ -90,33 +97,37 @@ export class Discs {
         const box = {
             corner: start, size: both((i) => end[i] - start[i]), origin: both((i) => start[i] + lens.marginPx), texel: 1,
         };
-        const reach = Math.max(...places.map((place) => place.reach));
-        this.drawBlocks(["composite.frag"], into, box, wantedBy(places), reach, { "places[0]": table }, { atlas: blurred });
+        const textures = { atlas: blurred, occupancy: renderer.sheets.reach };
+        this.drawBlocks(["composite.frag"], into, box, 2 ** lens.slices.length - 1, { "places[0]": table }, textures);
     }
 
     // Returns where the slices of a tile lie, and the sizes of both sheets.
     placesOf(start, end) {
         const { picture: { lens: { slices, marginPx } }, blockPx } = this, shelves = [new Shelves(), new Shelves()];
-        const places = slices.map((slice, index) => {
-            const texel = 2 ** slice.level, pad = Math.ceil(slice.reach) + 1, beside = slice.level ? 2 : 0;
-            const from = both((i) => Math.floor((start[i] + marginPx) / texel) - beside);
-            const blurredSize = both((i) => Math.ceil((end[i] + marginPx) / texel) + beside - from[i]);
-            const size = blurredSize.map((extent) => extent + 2 * pad);
+        const places = slices.map(({ level, taps, diameterPx, reachPx }, index) => {
+            const texel = 2 ** level, unit = this.pointBlocks(texel) * blockPx, beside = level ? texel : 0;
+            const low = both((i) => Math.floor((blockPx * Math.floor((start[i] + marginPx) / blockPx) - beside) / unit));
+            const high = both((i) => Math.ceil((multiple(end[i] + marginPx, blockPx) + beside) / unit));
+            const pad = Math.ceil(reachPx / unit), sizeOf = (more) => both((i) => (high[i] - low[i] + 2 * more) * unit / texel);
+            const size = sizeOf(pad), blurredSize = sizeOf(0);
             return {
-                index, slice, texel, pad, size, blurredSize, source: shelves[0].add(...size),
-                target: shelves[1].add(...blurredSize), origin: from.map((place) => (place - pad) * texel),
-                first: from.map((place) => place * texel), reach: Math.ceil((slice.reachPx + texel) / blockPx),
+                index, taps, diameterPx, texel, size, blurredSize, pad: pad * unit / texel,
+                source: shelves[0].add(...size), target: shelves[1].add(...blurredSize),
+                origin: low.map((place) => (place - pad) * unit), first: low.map((place) => place * unit),
             };
         });
         return { places, sizes: shelves.map((each) => each.size()) };
     }
 
+    // Returns the side of a point in blocks, so that it has ALIGNED_PX pixels at least.
+    pointBlocks = (texel) => Math.max(Math.floor(ALIGNED_PX * texel / this.blockPx), 1);
+
     drawSlices(places, sheet) {
         this.renderer.clear(sheet);
         for (const { index, texel, origin, source, size } of places) {
             const values = { ...this.area(), tent: this.tents[index], origin, corner: source, texel };
-            const wanted = Array(MAX_REACH_BLOCKS + 1).fill(1 << index), box = { corner: source, size, origin, texel };
-            this.drawBlocks(["slice.frag"], sheet, box, wanted, Number(texel > this.blockPx), values, this.surfaces());
+            const box = { corner: source, size, origin, texel }, { occupancy } = this.renderer.sheets;
+            this.drawBlocks(["slice.frag"], sheet, box, 1 << index, values, { ...this.surfaces(), occupancy });
         }
     }
 
@@ -125,16 +136,17 @@ export class Discs {
         const program = ["disc.frag", lens.shape.kind === "cat_eye" && "CAT_EYE"];
         renderer.clear(blurred);
         for (const place of places) {
-            const { index, slice: { taps }, source, target, pad, blurredSize: size, first: origin, texel } = place;
+            const { index, taps, source, target, pad, blurredSize: size, first: origin, texel } = place;
             gl.bindBufferRange(gl.UNIFORM_BUFFER, 0, this.taps, index * bytes, bytes);
             const shift = both((i) => source[i] + pad - target[i]), box = { corner: target, size, origin, texel };
             const values = { tap_count: taps.length, shift, ...this.barrelOf(place) };
-            this.drawBlocks(program, blurred, box, wantedBy([place]), place.reach, values, { atlas: sheets.slices });
+            const textures = { atlas: sheets.slices, occupancy: sheets.reach };
+            this.drawBlocks(program, blurred, box, 1 << index, values, textures);
         }
     }
 
     // Returns the uniforms of a cat's-eye, see disc.frag.
-    barrelOf({ slice: { diameterPx }, texel, first, target }) {
+    barrelOf({ diameterPx, texel, first, target }) {
         const { picture: { lens, part, width, height }, renderer: { field } } = this;
         const radius = Math.max(Math.abs(diameterPx) / 2 / texel, 1e-6), aspect = field.height / field.width;
         const moved = 2 * lens.shape.cat_eye / Math.hypot(1, aspect), px = [part.width / width, part.height / height];
@@ -145,31 +157,23 @@ export class Discs {
         };
     }
 
-    // Draws the blocks of a box of a sheet in which slices have something within reach, see blocks.vert. corner: first
-    // pixel of the box; origin: the same in the surfaces, px; texel: side of a pixel, px of the surfaces.
-    drawBlocks(program, sheet, { corner, size, origin, texel }, wanted, reach, values, textures) {
-        const { renderer, blockPx } = this, { gl } = renderer, step = blockPx / texel, extent = [sheet.width, sheet.height];
-        const first = both((i) => Math.floor(origin[i] / blockPx));
-        const count = both((i) => Math.ceil((origin[i] + size[i] * texel) / blockPx) - first[i]);
-        const place = both((i) => 2 * (corner[i] - origin[i] / texel) / extent[i] - 1);
-        const { occupancy } = renderer.sheets;
+    // Draws the blocks of a box of a sheet that have some of the wanted slices, a bit for each, see blocks.vert. corner:
+    // first pixel of the box; origin: the same in the surfaces, px; texel: side of a pixel, px of the surfaces.
+    drawBlocks(program, { framebuffer }, { corner, size, origin, texel }, wanted, values, textures) {
+        const { renderer, blockPx } = this, { gl } = renderer, blocks = this.pointBlocks(texel), px = blocks * blockPx;
+        const first = both((i) => Math.floor(origin[i] / px)), side = px / texel;
+        const [across, down] = both((i) => Math.ceil((origin[i] + size[i] * texel) / px) - first[i]);
+        const [x, y] = both((i) => corner[i] - (origin[i] - first[i] * px) / texel);
         gl.enable(gl.SCISSOR_TEST);
         gl.scissor(...corner, ...size);
-        renderer.draw(program, sheet, {
-            ...values, "wanted[0]": wanted, reach, blocks: [...first, ...count],
-            target_of_blocks: [...place, ...both((i) => 2 * step / extent[i])],
-        }, { occupancy, ...textures }, "blocks.vert", 6 * count[0] * count[1]);
+        const points = { points: [...first, across, down], point_blocks: blocks, point_px: side, wanted };
+        const box = { framebuffer, x, y, width: across * side, height: down * side };
+        renderer.draw(program, box, { ...values, ...points }, textures, "blocks.vert", across * down);
         gl.disable(gl.SCISSOR_TEST);
     }
 }
 
-// Returns the slices that reach so many blocks, a bit for each.
-function wantedBy(places) {
-    return Array.from({ length: MAX_REACH_BLOCKS + 1 }, (_, away) => (
-        places.reduce((bits, { index, reach }) => bits | (away <= reach ? 1 << index : 0), 0)));
-}
-
-// Places rectangles below each other, in columns.
+// Places rectangles below each other, in columns, on whole multiples of ALIGNED_PX.
 class Shelves {
     left = 0;
     width = 0;
@@ -177,13 +181,13 @@ class Shelves {
     height = 0;
 
     add(width, height) {
-        if (this.top + height > MAX_ATLAS_PX) Object.assign(this, { left: this.left + this.width, width: 0, top: 0 });
+        if (this.top + height > MAX_ATLAS_PX) Object.assign(this, { left: this.left + multiple(this.width, ALIGNED_PX), width: 0, top: 0 });
         const corner = [this.left, this.top];
-        this.top += height;
+        this.top += multiple(height, ALIGNED_PX);
         this.width = Math.max(this.width, width);
         this.height = Math.max(this.height, this.top);
         return corner;
     }
 
-    size = () => [64 * Math.ceil((this.left + this.width) / 64), 256 * Math.ceil(this.height / 256)];
+    size = () => [multiple(this.left + this.width, 64), multiple(this.height, 256)];
 }

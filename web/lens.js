@@ -13,7 +13,7 @@ export const WHOLE = { x: 0, y: 0, width: 1, height: 1 };
 export const hash = (place) => `${place.t},${place.s}`;
 export const fraction = (number, step) => (number * step + 0.5) % 1;
 
-const EDGE_MARGIN_PX = 4, TILT_STEPS = 17, CORNERS = [[0, 0], [1, 1], [1, 0], [0, 1]];
+const EDGE_MARGIN_PX = 4, MARGIN_STEP_PX = 4, TILT_STEPS = 17, CORNERS = [[0, 0], [1, 1], [1, 0], [0, 1]];
 const sumOf = (weighted) => weighted.reduce((sum, one) => sum + one.weight, 0);
 
 // Returns the first and the last offset of the stored views along an axis of `count` views.
@@ -63,7 +63,8 @@ export function lensOf(optics, field, widthPx, level = NUMBERS.LEVELS[0]) {
     const widest = beside.reduce((most, each) => Math.max(most, Math.abs(each)), 1e-9);
     const texelPx = widthPx / field.width, discPx = Math.min(diameter * texelPx, widthPx / widest);
     const slices = discPx > 0 && field.hasDisparity ? slicesOf(beside.map((each) => discPx * each), optics.shape) : [];
-    const marginPx = slices.length && Math.ceil(Math.max(...slices.map(({ reachPx }) => reachPx))) + EDGE_MARGIN_PX;
+    const reachPx = Math.max(...slices.map((slice) => slice.reachPx)) + EDGE_MARGIN_PX;
+    const marginPx = slices.length && MARGIN_STEP_PX * Math.ceil(reachPx / MARGIN_STEP_PX);
     const gain = NUMBERS.HIGHLIGHT_GAIN * optics.highlights * Math.min(diameter, 1);
     return { ...optics, diameter, slices, discPx, texelPx, marginPx, gain, level };
 }

@@ -33,9 +33,9 @@ function linked(gl, vertex, fragment) {
 export class Renderer {
     constructor(canvas, shaders, field) {
         const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
-        const extensions = ["EXT_color_buffer_half_float", "EXT_color_buffer_float"];
-        if (!extensions.some((name) => gl?.getExtension(name))) throw new Error("no WebGL 2 that draws half floats");
-        Object.assign(this, { gl, canvas, shaders, field, programs: new Map(), sheets: {}, hidden: null });
+        const isFloat = Boolean(gl?.getExtension("EXT_color_buffer_float"));
+        if (!isFloat && !gl?.getExtension("EXT_color_buffer_half_float")) throw new Error("no WebGL 2 that draws half floats");
+        Object.assign(this, { isFloat, gl, canvas, shaders, field, programs: new Map(), sheets: {}, hidden: null });
         if ("drawingBufferColorSpace" in gl) gl.drawingBufferColorSpace = field.colorSpace;
         const side = Math.max(field.width, field.height);
         if (side > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new Error(`no textures of ${side} pixels`);
@@ -112,7 +112,7 @@ export class Renderer {
     }
 
     // Draws with a program: a fragment shader and its switches. values, textures: of uniforms and samplers by name; those
-    // that the compiler left out are skipped. count: number of vertices of triangles; without it, the whole target.
+    // that the compiler left out are skipped. count: number of points; without it, the whole target.
     draw([fragment, ...switches], { framebuffer, x = 0, y = 0, width, height }, values, textures, vertex = "fullscreen.vert", count = 0) {
         const { gl, shaders } = this, names = switches.filter(Boolean), key = [vertex, fragment, ...names].join(" ");
         if (!this.programs.has(key)) {
@@ -130,7 +130,7 @@ export class Renderer {
             uniforms.get(name)(unit);
         });
         for (const [name, value] of Object.entries(values)) uniforms.get(name)?.(value);
-        if (count) gl.drawArrays(gl.TRIANGLES, 0, count);
+        if (count) gl.drawArrays(gl.POINTS, 0, count);
         else gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);  // the fourth corner of fullscreen.vert lies outside
     }
 

@@ -36,8 +36,8 @@ function means(values, factor) {
 }
 
 function sliceOf(diameterPx, shape) {
-    const { WIDEST_TEXELS, STEPS_A_TEXEL } = NUMBERS;
-    const level = Math.max(Math.floor(Math.log2(Math.max(Math.abs(diameterPx), 1e-9) / WIDEST_TEXELS)) + 1, 0);
+    const { FULL_SIZE_PX, WIDER_A_LEVEL, STEPS_A_TEXEL } = NUMBERS, wider = Math.max(Math.abs(diameterPx) / FULL_SIZE_PX, 1);
+    const level = Math.ceil(Math.log(wider) / Math.log(WIDER_A_LEVEL) - 1e-9);
     const texels = rounded(diameterPx / 2 ** level * STEPS_A_TEXEL) / STEPS_A_TEXEL;
     const key = [...Object.values(shape), texels, level > 0].join();
     if (!kept.has(key)) {
@@ -45,36 +45,50 @@ function sliceOf(diameterPx, shape) {
         kept.set(key, discTaps(shape, texels, level > 0));
     }
     const taps = kept.get(key), reach = Math.max(...taps.map(([x, y]) => Math.max(Math.abs(x), Math.abs(y))));
-    return { diameterPx, level, taps, reach, reachPx: 2 ** level * (reach + 1) };
+    return { diameterPx, level, taps, reachPx: 2 ** level * (reach + 1) };
 }
 
 // Returns the samples of a disc. diameter: in pixels of the size at which it is drawn.
 export function discTaps(shape, diameter, isReduced) {
-    const { SHARP_PX, SUBSAMPLES, REDUCTION_BLUR } = NUMBERS, alone = [[0, 0, 1]];
+    const { SHARP_PX, SUBSAMPLES } = NUMBERS, alone = [[0, 0, 1]];
     if (Math.abs(diameter) < SHARP_PX) return alone;
-    const across = diameter * Math.sqrt(1 - (isReduced ? REDUCTION_BLUR / diameter ** 2 : 0));
-    const half = 2 * (Math.floor(Math.ceil(Math.abs(across) / 2 + 0.5) / 2) + 1);
-    const place = (i) => ((i + 0.5) / SUBSAMPLES - half - 0.5) / across;
-    const covered = new Float64Array(4 * half * half), distance = edgeDistance(shape);
-    for (let y = 0; y < 2 * half * SUBSAMPLES; y++) {
-        for (let x = 0; x < 2 * half * SUBSAMPLES; x++) {
-            const at = 2 * half * Math.floor(y / SUBSAMPLES) + Math.floor(x / SUBSAMPLES);
-            const inside = distance(place(y), place(x)) * SUBSAMPLES * Math.abs(across);
+    const side = 4 * (Math.floor(Math.ceil(Math.abs(diameter) / 2 + 1.5) / 2) + 1), distance = edgeDistance(shape);
+    const place = (i) => ((i + 0.5) / SUBSAMPLES - side / 2 - 0.5) / diameter;
+    let covered = new Float64Array(side * side);
+    for (let y = 0; y < side * SUBSAMPLES; y++) {
+        for (let x = 0; x < side * SUBSAMPLES; x++) {
+            const at = side * Math.floor(y / SUBSAMPLES) + Math.floor(x / SUBSAMPLES);
+            const inside = distance(place(y), place(x)) * SUBSAMPLES * Math.abs(diameter);
             covered[at] += clamp(0.5 + inside, 0, 1) / SUBSAMPLES ** 2;
         }
     }
+    if (isReduced) covered = sharpened(covered, side);
+    const taps = [Math.max, Math.min].flatMap((part) => bilinearTaps(covered.map((share) => part(share, 0)), side));
+    const total = taps.reduce((sum, [, , weight]) => sum + weight, 0);
+    return taps.length ? taps.map(([x, y, weight]) => [x, y, weight / total]) : alone;
+}
+
+function sharpened(kernel, side) {
+    const at = (i, x, step) => (x + step < 0 || x + step >= side ? 0 : kernel[i] ?? 0);
+    return kernel.map((share, i) => {
+        const x = i % side, beside = at(i - 1, x, -1) + at(i + 1, x, 1) + at(i - side, x, 0) + at(i + side, x, 0);
+        return share - NUMBERS.REDUCTION_BLUR / 2 * (beside - 4 * share);
+    });
+}
+
+// Returns samples of a kernel of one sign, each with the weights of two by two pixels.
+function bilinearTaps(kernel, side) {
     const taps = [];
-    let total = 0;
-    for (let row = 0; row < half; row++) {
-        for (let column = 0; column < half; column++) {
-            const first = 4 * half * row + 2 * column, second = first + 2 * half;
-            const right = covered[first + 1] + covered[second + 1], lower = covered[second] + covered[second + 1];
-            const weight = covered[first] + covered[second] + right;
-            total += weight;
-            if (weight > 1e-4) taps.push([2 * column - half + right / weight, 2 * row - half + lower / weight, weight]);
+    for (let y = 0; y < side; y += 2) {
+        for (let x = 0; x < side; x += 2) {
+            const first = side * y + x, second = first + side;
+            const right = kernel[first + 1] + kernel[second + 1], lower = kernel[second] + kernel[second + 1];
+            const weight = kernel[first] + kernel[second] + right;
+            if (Math.abs(weight) <= NUMBERS.MIN_TAP) continue;
+            taps.push([x - side / 2 + right / weight, y - side / 2 + lower / weight, weight]);
         }
     }
-    return taps.length ? taps.map(([x, y, weight]) => [x, y, weight / total]) : alone;
+    return taps;
 }
 
 // Returns a function of a place (t, s): the distance to the edge of an opening of diameter 1, positive inside.

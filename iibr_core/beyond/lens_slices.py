@@ -2,7 +2,7 @@
 
 A slice holds the pixels with about the same defocus: its disc has one diameter, in pixels of the picture, positive for
 surfaces nearer than the focus. Wide discs are drawn at a reduced size, so all discs cost about the same.
-Plain arrays, no GL; web/renderer.js has the same.
+Plain arrays, no GL; web/slices.js has the same.
 """
 
 from __future__ import annotations

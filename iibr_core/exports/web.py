@@ -28,8 +28,8 @@ from iibr_core.types import SRGB, ImageSize
 
 AVIF = "image/avif"
 SHADERS = (
-    "fullscreen.vert", "blocks.vert", "lens.frag", "surfaces.frag", "occupancy.frag", "slice.frag", "disc.frag",
-    "composite.frag", "present.frag", "window.vert", "window.frag",
+    "fullscreen.vert", "blocks.vert", "lens.frag", "surfaces.frag", "occupancy.frag", "reach.frag", "slice.frag",
+    "disc.frag", "composite.frag", "present.frag", "window.vert", "window.frag",
 )  # fmt: skip
 """The shaders that the page has: the desktop's, and those of a headset, see `web/renderer.js`."""
 PREAMBLE = "preamble.glsl"
