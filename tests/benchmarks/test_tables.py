@@ -75,22 +75,6 @@ def test_every_valid_file_is_read_and_some_copies_are_refused(tmp_path) -> None:
     assert list(fuzz(readers, 2, 0, tmp_path)) == []
 
 
-def test_a_planted_crash_is_found_and_kept(tmp_path) -> None:
-    path = tmp_path / "now.txt"
-    path.write_bytes(b"1 2 3 " * 50)
-
-    def read(file: Path) -> list[np.ndarray]:
-        if len(file.read_bytes()) < 100:
-            raise IndexError("short")
-        return [np.array([1.0])]
-
-    folder = tmp_path / "kept"
-    folder.mkdir()
-    assert list(fuzz({path: read}, 60, 1, folder)) == ["now.txt: IndexError in test_tables.py, read: 'short'"]
-    assert len((folder / "now.txt").read_bytes()) < 100
-    assert path.read_bytes() == b"1 2 3 " * 50
-
-
 @pytest.mark.parametrize(
     ("message", "result", "fault"),
     [("one line", None, ""), ("two\nlines", None, "several"), ("", [np.array([np.nan])], "not finite")],

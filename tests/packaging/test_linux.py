@@ -79,13 +79,6 @@ def test_the_manual_has_every_command_and_option(pages: Path) -> None:
         assert section, name
 
 
-def test_the_changelog_has_debians_form(pages: Path) -> None:
-    lines = gzip.decompress((pages / "changelog.gz").read_bytes()).decode().splitlines()
-    assert lines[0].startswith("iibr (")
-    assert lines[-1].startswith(" -- ")
-    assert all(line == "" or line.startswith("  ") for line in lines[1:-1])
-
-
 def test_packages_hold_every_icon_and_nothing_that_lacks() -> None:
     contents = yaml.safe_load((LINUX / "nfpm.yaml").read_text("utf-8"))["contents"]
     sources = [entry["src"] for entry in contents if "src" in entry]

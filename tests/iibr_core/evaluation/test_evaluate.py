@@ -18,13 +18,11 @@ from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.method.light_field import ViewMaker, generate
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import ViewOffset
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
 from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid
 from tests.iibr_core.lens_scenes import FOLDER
-from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of
 
 WAYS = ["unchanged photo", "one plane", "plain warp, true map", "iibr, true map"]
 REPORT = ["index.html", "report.json", "report.md"]
@@ -42,17 +40,6 @@ def folder(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def results(folder) -> list[Result]:
     return evaluate(scene_of(folder), Options(choice=UNREFINED))
-
-
-def test_views_are_those_that_generate_makes() -> None:
-    photo, disparity = photo_of(view_of_square(ViewOffset(0.0, 0.0))), disparity_of(disparity_of_square())
-    grid = GridShape(5, 5)
-    made = by_index(list(generate(photo, disparity, literal_plan(photo, disparity, 5))))
-    offsets = {(v, u): grid.offset(v, u) for v, u in made if (v, u) != grid.centre}
-    views = ViewMaker(photo.pixels, disparity.values, offsets.values())
-    for index, offset in offsets.items():
-        shown = np.rint(255 * quantise_as_stored(views.view(offset).colors)).astype(np.uint8)
-        np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
 
 
 def test_both_trials_have_every_row(results) -> None:

@@ -23,13 +23,10 @@ from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.lens_limits import aperture_limit, first_aperture, focus_limits
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
+from tests.iibr_core.embedded_files import packet
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 
 KIND = EXPORTS["web"]
-XMP = """<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
-<rdf:Description xmlns:dc="http://purl.org/dc/elements/1.1/">
-<dc:title><rdf:Alt><rdf:li>A &lt;b&gt;title&lt;/b&gt;</rdf:li>
-</rdf:Alt></dc:title></rdf:Description></rdf:RDF></x:xmpmeta>"""
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +97,9 @@ def test_words_of_the_photo_come_only_if_asked(opened, tmp_path) -> None:
     exif = Image.Exif()
     exif[0x010E], exif[0x013B], exif[0x8298] = "A <i>bridge</i>", 'Ann "A" O\'Neil', "(c) <Ann>"
     exif.get_ifd(0x8825)[1] = "N"
-    Image.new("RGB", (8, 8)).save(photo, exif=exif, xmp=XMP.encode())
+    title = "<dc:title><rdf:Alt><rdf:li>A &lt;b&gt;title&lt;/b&gt;</rdf:li></rdf:Alt></dc:title>"
+    xmp = packet({"http://purl.org/dc/elements/1.1/ source": "x"}, title.replace("dc:", "n0:"))
+    Image.new("RGB", (8, 8)).save(photo, exif=exif, xmp=xmp)
     assert caption_in(read_metadata(photo)).title == "A <b>title</b>"
     source = replace(opened, scene=replace(opened.scene, source=replace(opened.scene.source, path=str(photo))))
     plain, credited = page_of(source)[0], page_of(source, credit=True)[0]

@@ -76,13 +76,6 @@ def test_viewing_parallax_does_not_depend_on_the_unit() -> None:
     assert np.ptp(one.disparity[1, 1]) * 2 == pytest.approx(0.04 * 80, rel=0.01)
 
 
-def test_views_come_by_their_place_to_the_right_and_down() -> None:
-    pixels, values = square_scene()
-    field = iibr.from_arrays(pixels, values).light_field((3, 5))
-    np.testing.assert_array_equal(np.round(255 * field.view(2, -1)), field.views[0, 4])
-    np.testing.assert_array_equal(np.round(255 * field.view(0, 0)), np.round(255 * pixels))
-
-
 def test_a_view_between_is_what_a_denser_field_has_there() -> None:
     pixels, values = square_scene()
     scene = iibr.from_arrays(pixels, values)
@@ -211,6 +204,8 @@ def test_views_come_once_the_middle_one_first() -> None:
     assert (views[0].row, views[0].column) == scene.plan((3, 5)).grid.centre
     assert {(view.row, view.column) for view in views} == set(np.ndindex(3, 5))
     whole = scene.light_field((3, 5), depth_strength=0.5)
+    np.testing.assert_array_equal(np.round(255 * whole.view(2, -1)), whole.views[0, 4], "to the right and down")
+    np.testing.assert_array_equal(np.round(255 * whole.view(0, 0)), np.round(255 * scene.photo))
     np.testing.assert_array_equal(whole.views[2, 4], next(v for v in views if (v.row, v.column) == (2, 4)).colors)
     assert scene.plan(3, depth_strength=0.5).disparity_scale == 0.5 * scene.plan(3).disparity_scale
 

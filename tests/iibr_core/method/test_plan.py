@@ -35,22 +35,20 @@ def test_parallax_is_a_share_of_the_width_whatever_the_units(scale):
     assert plan.has_disocclusion
 
 
-def test_grid_follows_the_parallax():
-    photo, disparity = square_before_wall(60, 1000)
-    small = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.3))
-    assert small.grid.columns < plan_for_viewing(photo, disparity).grid.columns
-    assert 0.3 * TOTAL_PARALLAX * 1000 / (small.grid.columns - 1) <= STEP_PX
-    huge = plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=50))
-    assert huge.grid.columns == MAX_VIEWS_A_SIDE
-
-
-def test_every_choice_can_be_overridden():
+def test_every_choice_can_be_overridden_and_the_grid_follows_the_parallax():
     photo, disparity = square_before_wall(60, 200)
     plan = plan_for_viewing(photo, disparity, PlanOverrides(GridShape(3, 7), -1.0, focus_disparity=2.0))
     assert plan.grid == (3, 7)
     assert plan.disparity_zero == 2.0
     assert plan.disparity_scale < 0
     assert plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.0)).grid == (1, 1)
+    photo, disparity = square_before_wall(60, 1000)
+    small, huge = (plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=at)).grid for at in (0.3, 50))
+    assert small.columns < plan_for_viewing(photo, disparity).grid.columns < huge.columns == MAX_VIEWS_A_SIDE
+    assert 0.3 * TOTAL_PARALLAX * 1000 / (small.columns - 1) <= STEP_PX
+    for strength in (float("nan"), float("inf")):
+        with pytest.raises(InputError, match="depth strength"):
+            plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=strength))
 
 
 def test_literal_takes_disparity_as_it_is():
@@ -100,12 +98,6 @@ def test_views_that_are_written_and_forgotten_need_no_memory(monkeypatch):
             plan(keeps=True)
 
 
-@pytest.mark.parametrize("strength", [float("nan"), float("inf")])
-def test_depth_strength_must_be_finite(strength):
-    with pytest.raises(InputError, match="depth strength"):
-        plan_for_viewing(*square_before_wall(), PlanOverrides(depth_strength=strength))
-
-
 HEIGHT, WIDTH = 240, 320
 
 
@@ -146,12 +138,6 @@ def test_a_noisy_wall_is_one_view(noise, at):
     assert plan.disparity_range_px == (0.0, 0.0)
 
 
-def test_slats_are_no_noise():
-    slats = np.tile(np.float32([0, 0, 0, 3, 3, 3]), (HEIGHT, WIDTH // 6))
-    for values in (slats, np.ascontiguousarray(slats.T)):
-        assert measure_disparity_range(values) == DisparityRange(0.0, 3.0, 0.0)
-
-
 @pytest.mark.parametrize("wild", [1e6, -1e6, 50.0])
 @pytest.mark.parametrize("count", [1, 30])
 def test_lone_wild_pixels_neither_set_the_range_nor_move_beyond_it(wild, count):
@@ -172,11 +158,16 @@ def test_a_range_that_is_hardly_more_than_noise_moves_less():
     assert 0.1 * plan.disparity_scale * 4 == pytest.approx(1.0, rel=0.05)
 
 
-def test_planes_have_no_noise_and_keep_their_range():
+def test_planes_and_slats_have_no_noise_and_keep_their_range():
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     span = measure_disparity_range(0.25 * x - 0.5 * y)
     assert span.noise == pytest.approx(0, abs=1e-5)
     assert span.range == pytest.approx(0.25 * WIDTH + 0.5 * HEIGHT, rel=0.05)
+    slats = np.tile(np.float32([0, 0, 0, 3, 3, 3]), (HEIGHT, WIDTH // 6))
+    for values in (slats, np.ascontiguousarray(slats.T)):
+        assert measure_disparity_range(values) == DisparityRange(0.0, 3.0, 0.0)
+    for shape in ((1, 1), (1, 9), (2, 2), (2, 400)):
+        assert measure_disparity_range(np.full(shape, 7.0, np.float32)) == DisparityRange(7.0, 7.0, 0.0)
 
 
 @pytest.mark.parametrize("steps", [40, 64, 255])
@@ -184,11 +175,8 @@ def test_what_a_map_is_rounded_to_is_found(steps):
     y, x = np.indices((HEIGHT, WIDTH))
     smooth = np.hypot(y - 100, x - 150) / 260
     assert rounding_step(np.round(smooth * steps).astype(np.float32) / steps) == pytest.approx(1 / steps)
-
-
-@pytest.mark.parametrize("values", [wall(), bird(0.0), np.ones((1, 1), np.float32)])
-def test_edges_are_no_rounding(values):
-    assert rounding_step(values) == 0
+    for edges in (wall(), bird(0.0), np.ones((1, 1), np.float32)):
+        assert rounding_step(edges) == 0
 
 
 UPPER_LEFT, LOWER_RIGHT = ViewOffset(-2.0, -1.0), ViewOffset(1.0, 3.0)
@@ -228,11 +216,8 @@ def test_each_side_s_own_disparity_counts_and_nothing_where_no_view_looks_out():
     disparity[:, -1] = 2.0
     assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]) == (0, 0, 0, 6 + LOOKUP_MARGIN_PX)
     assert outpainting_margins(disparity, [ViewOffset(0.0, -3.0)]) == (0, 0, 0, 0)
-
-
-def test_margins_are_bounded_and_wild_pixels_do_not_count():
     wide = outpainting_margins(np.full((80, 120), 50.0, np.float32), [UPPER_LEFT, LOWER_RIGHT])
     assert wide == (MAX_MARGIN * 80, MAX_MARGIN * 80, MAX_MARGIN * 120, MAX_MARGIN * 120)
     disparity = np.zeros((400, 400), np.float32)
     disparity[0, :3] = 9.0
-    assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0
+    assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0, "wild pixels do not count"
