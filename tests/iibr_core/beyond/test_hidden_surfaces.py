@@ -24,6 +24,9 @@ def test_nothing_of_the_foreground_is_seen_behind_it() -> None:
     assert behind[SQUARE].mean() > 0.9
     np.testing.assert_allclose(hidden.disparity[behind], 0.0, atol=0.05)
     np.testing.assert_allclose(hidden.colors[behind], WALL, atol=0.02)
+    narrow = hidden_surface(colors, disparity, 2.0)
+    assert narrow.disparity[30, 40] == 3, "a narrower lens sees nothing behind the middle"
+    assert narrow.disparity[21, 40] == pytest.approx(0, abs=0.05)
 
 
 def test_views_that_saw_the_wall_show_it_but_for_their_mixed_pixels() -> None:

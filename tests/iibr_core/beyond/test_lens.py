@@ -142,6 +142,7 @@ FROM_GEOMETRY = [
     (ApertureShape("ring", ring_inner=0.5), (0.0, 0.0), (1 + 0.5**2) / 4),
     (CROSS, (0.0, 0.0), (2 / 3) ** 2 * (1 / 12 + 2 / 5)),
     (CORNER, (-1 / 6, -1 / 6), 1 / 3 - 1 / 36),
+    (replace(CORNER, rotation_deg=90.0), (-1 / 6, 1 / 6), 1 / 3 - 1 / 36),
 ]
 """Shape; for a radius of 1: centre (t, s) and second moment about it per axis."""
 UNLIMITED = 99.0
@@ -155,6 +156,11 @@ def test_cameras_have_centre_and_width_of_the_opening(case, diameter, count) -> 
     points = aperture_points(shape, diameter, UNLIMITED, count)
     assert points.mean(0) == pytest.approx(radius * np.array(centre), abs=0.01 * radius)
     assert np.mean((points - points.mean(0)) ** 2) == pytest.approx(radius**2 * moment, rel=0.02)
+
+
+def test_blades_turn_to_the_right() -> None:
+    corners = aperture_points(ApertureShape("polygon", blades=3, rotation_deg=30.0), 2.0, UNLIMITED, 256)
+    assert (corners[:, 1].min(), corners[:, 1].max()) == pytest.approx((-1, 0.5), abs=0.12)
 
 
 def test_an_empty_mask_is_a_pinhole_in_the_middle() -> None:

@@ -57,6 +57,8 @@ def test_orientation_order_of_colours_and_normalisation(tmp_path, channel) -> No
 def test_the_input_has_the_photos_aspect_in_multiples_of_14(height, width) -> None:
     size = USUAL_PREPARATION.size_for(ImageSize(height, width))
     assert all(side % 14 == 0 and side >= 28 for side in size)
+    fixed = replace(USUAL_PREPARATION, size=ImageSize(280, 560), keeps_aspect=False)
+    assert fixed.size_for(ImageSize(height, width)) == (280, 560)
     assert size.height * size.width <= 2.5 * 518 * 518
     if max(height, width) < 2.5 * min(height, width):
         assert abs(size.width / size.height / (width / height) - 1) < 0.06

@@ -120,6 +120,7 @@ def test_a_path_goes_through_its_keys(source, tmp_path) -> None:
     keys.write_text("\ufeff# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n", "utf-8")
     path = path_of(replace(source, optics=replace(source.optics, aperture_diameter=1.5)), keys=keys, frames=6)
     assert path[0].eye == ViewOffset(0, -1)
+    assert path[1].eye == pytest.approx((0.40625, 0.0)), "a spline of Catmull and Rom"
     assert (path[2].eye, path[2].focus_disparity, path[2].aperture_diameter) == (ViewOffset(0.5, 1), -0.1, 2)
     assert (path[4].eye, path[4].focus_disparity, path[4].aperture_diameter) == (ViewOffset(-1, 0), 0.0, 1.5)
 

@@ -55,6 +55,7 @@ def test_splats_as_spz_are_those_of_the_ply_file(source, tmp_path, nearest, fart
     ply = PlyData.read(str(exported(known, "splats", tmp_path / "a.ply")))["vertex"]
     if nearest is not None:
         assert (ply["z"].min(), ply["z"].max()) == pytest.approx((nearest, farthest), rel=1e-3), "metres"
+    assert np.exp(ply["scale_0"]) == pytest.approx(0.6 * ply["z"] / cameras_of(known).focal_px, rel=1e-3)
     message = write_export(EXPORTS["splats"], tmp_path / "a.spz", known, ExportOptions())
     assert (message is None) if factor == 1 else (f"{factor} times" in message)
     spz = read_spz(tmp_path / "a.spz")

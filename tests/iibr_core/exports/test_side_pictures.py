@@ -168,14 +168,13 @@ def test_boxes_of_a_spatial_photo_are_as_apples(tmp_path, size) -> None:
     assert means == pytest.approx([eye.mean(), 255 - eye.mean()], abs=2)
 
 
-def test_libheif_knows_the_pair_and_its_cameras(tmp_path) -> None:
+def test_libheif_knows_the_pair_and_its_cameras_at_twice_the_size(source, tmp_path) -> None:
     pytest.importorskip("pillow_heif", minversion="1.8")
-    eye = np.zeros((64, 96, 3), np.uint8)
-    write_spatial_photo(tmp_path / "a.heic", eye, eye, focal_px=90.0)
-    file = pillow_heif.open_heif(tmp_path / "a.heic")
+    path = exported(source, "spatial-photo", tmp_path / "a.heic", size=ScreenSize(192, 128))
+    file = pillow_heif.open_heif(path)
     (pair,) = file.info["entity_groups"]
     assert (pair["type"], pair["images"]) == ("ster", [0, 1])
     for picture in file:
         camera = picture.info["heif"]["camera_intrinsic_matrix"]
-        assert camera["focal_length_x"] == pytest.approx(90)
-        assert (camera["principal_point_x"], camera["principal_point_y"]) == (48, 32)
+        assert camera["focal_length_x"] == pytest.approx(2 * source.focal_px)
+        assert (camera["principal_point_x"], camera["principal_point_y"]) == (96, 64)

@@ -26,6 +26,8 @@ def test_a_display_states_its_lenses(tmp_path: Path) -> None:
     assert across / up == pytest.approx(-7)
     assert (display.screen, display.cells, display.is_inverted) == (ImageSize(2048, 1536), (STRIPES,), True)
     assert display.quilt == DEVICES["portrait"]
+    mirrored = parse_calibration(json.dumps(PORTRAIT | {"flipImageX": 1}), "a")
+    assert (mirrored.lenses_per_px, mirrored.is_mirrored) == ((across, -up), (True, False)), "so do its lenses"
 
 
 def test_values_may_stand_alone_and_defaults_are_those_of_all_displays() -> None:

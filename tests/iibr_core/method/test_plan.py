@@ -57,6 +57,8 @@ def test_literal_takes_disparity_as_it_is():
     assert (plan.field_disparity(disparity).values == disparity.values).all()
     assert plan.disparity_range_px == (0.0, 2.0)
     assert 0 < plan.edge_fraction < 0.5
+    wide = plan_literal(*square_before_wall(foreground=20.0), GridShape(3, 3))
+    assert "moves 40 px against the farthest" in wide.notes[0]
 
 
 @pytest.mark.parametrize(("step_px", "is_edge"), [(1.4, False), (1.6, True)])
