@@ -183,8 +183,11 @@ def colored(text: str, color: imgui.ImVec4) -> None:
     imgui.pop_style_color()
 
 
-def lines(text: str, count: int, width: float) -> None:
-    """Build quiet words on exactly that many lines, so that nothing below moves; a tooltip shows what does not fit."""
+def lines(text: str, count: int, width: float, tip: str = "") -> None:
+    """Build quiet words on exactly that many lines, so that nothing below moves; a tooltip shows what does not fit.
+
+    tip: tooltip after that.
+    """
     room, start = count * imgui.get_text_line_height(), imgui.get_cursor_pos_y()
     shown = text
     while shown and imgui.calc_text_size(shown, False, width).y > room:
@@ -192,7 +195,7 @@ def lines(text: str, count: int, width: float) -> None:
     imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
     imgui.text_colored(imgui.get_style().color_(imgui.Col_.text_disabled), shown)
     imgui.pop_text_wrap_pos()
-    tooltip(text if shown != text else "")
+    tooltip("\n".join(filter(None, (text if shown != text else "", tip))))
     imgui.set_cursor_pos_y(start + room)
     imgui.dummy(imgui.ImVec2(0, 0))
 

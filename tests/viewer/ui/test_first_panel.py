@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.depth.choice import DepthOrigin
 from iibr_core.scenes.scene import Progress
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import reduce
@@ -39,12 +40,16 @@ def test_there_are_few_controls_at_the_first_start(first, built, is_working):
 
 
 @pytest.mark.parametrize("font_scale", [1.0, 1.5])
-def test_nothing_below_the_status_line_moves_whatever_it_says(first, built, font_scale):
+def test_nothing_below_the_status_lines_moves_whatever_they_say(first, built, font_scale):
     first.state = replace(first.state, preferences=Preferences(font_scale=font_scale))
     long = Progress(doing="estimating depth with a model of an unusually long name from a folder, 40 %", left_s=7000.0)
     seen = set()
     for progress in (Progress(), Progress(doing="making views"), Progress(4, 9), Progress(9, 9, 3.0, share=1.0), long):
         first.state = replace(first.state, progress=progress)
+        first.screen(WINDOW)
+        seen |= {item.top for item in built if item.name == "Portrait"}
+    for words in ("flat", "estimated by the model of_an_unusually_long_name_from_a_folder.onnx"):
+        first.state = replace(first.state, scene=replace(first.scene, depth_origin=DepthOrigin("model", words)))
         first.screen(WINDOW)
         seen |= {item.top for item in built if item.name == "Portrait"}
     assert len(seen) == 1

@@ -79,8 +79,9 @@ def _place(prompt: Prompt, layout: Layout) -> None:
         width = min(PANEL_WIDTH * scale(), window.width)
         imgui.set_next_window_size_constraints(imgui.ImVec2(width, window.height), imgui.ImVec2(width, window.height))
         return
-    usual = PATH_WIDTH if isinstance(prompt, PathPrompt) else PROMPT_WIDTH
-    width, top = min(usual * scale(), window.width), PROMPT_TOP * window.height
+    width, top = min(PROMPT_WIDTH * scale(), window.width), PROMPT_TOP * window.height
+    if isinstance(prompt, PathPrompt):
+        width = max(min(PATH_WIDTH * scale(), (layout.panel.x or window.width) - 8 * scale()), width)
     room = min(max(layout.panel.x, width + 8 * scale()), window.width)
     imgui.set_next_window_pos(imgui.ImVec2(room / 2, top), 0, imgui.ImVec2(0.5, 0))
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, window.height - top))

@@ -25,6 +25,7 @@ from viewer.ui.widgets import (
     gap,
     label,
     last_part,
+    lines,
     quiet,
     scale,
     slider,
@@ -51,6 +52,7 @@ FAR_TIP = "Bring everything farther than this to this depth. The left handle abo
 NEAR_TIP = "Push everything nearer than this to this depth. The right handle above does the same."
 GAMMA_TIP = "Above 1, near things stand out more; below 1, far things do."
 NEAR_END_TIP = "Values of the map that count as near. Invert swaps near and far."
+ORIGIN_LINES = 2
 ENDS = ("the high end", "the low end"), ("white", "black")
 END_WORDS = {
     "the high end": "Large values of the map are",
@@ -73,12 +75,12 @@ def depth_source(state: AppState, scene: Scene) -> str:
 
 
 def depth_line(state: AppState, scene: Scene) -> None:
-    """Build one line about the source of depth, with a tooltip about failures."""
+    """Build two lines about the source of depth, with a tooltip about failures."""
     origin = scene.depth_origin
     without = depth_source(state, scene)
-    quiet(origin.line if origin is not None else "No depth." if without == "none" else f"Depth: {without}.")
-    if origin is not None:
-        tooltip("\n".join((*origin.failures, BETTER_DEPTH) if origin.is_poor else origin.failures))
+    words = origin.line if origin is not None else "No depth." if without == "none" else f"Depth: {without}."
+    tips = () if origin is None else (*origin.failures, BETTER_DEPTH) if origin.is_poor else origin.failures
+    lines(words, ORIGIN_LINES, imgui.get_content_region_avail().x, "\n".join(tips))
 
 
 def depth_section(state: AppState, scene: Scene) -> list[Action]:
