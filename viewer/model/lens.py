@@ -75,7 +75,7 @@ def reset(state: AppState) -> AppState:
     if state.scene is None:
         return state
     state = replace(_still(state), free_camera=None, tilt_handles=None, has_chosen_aperture=False)
-    state = replace(state, chosen_focus=None, focus_before=None)
+    state = replace(state, chosen_focus=None, focus_before=None, focused_at=None)
     return _edited(state, state.scene, Optics(gloss=state.optics.gloss)) if state.scene else state
 
 

@@ -176,7 +176,7 @@ def test_reset_takes_all_of_the_lens_back_in_one_step_but_gloss():
     state = after(state_with(scene_of()), CLICK, do(lens.set_gloss, FIRST_GLOSS), do(lens.show_tilt_handles, True))
     reset = lens.reset(state)
     assert reset.optics == Optics(gloss=FIRST_GLOSS)
-    assert reset.tilt_handles is None
+    assert (reset.tilt_handles, reset.focused_at) == (None, None)
     assert history.undo(reset).optics == state.optics
 
 
