@@ -6,9 +6,7 @@ step. All pictures are sheared to the zero plane, so that a point at depth z has
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from math import inf, sqrt
 from typing import Any
 
@@ -17,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import srgb_scalar
-from iibr_core.runtime.tiling import THREADS
+from iibr_core.runtime.tiling import THREADS, in_pieces
 from iibr_core.training.scenes.primitives import PLANE, albedo_at, distance_along, normal_at
 from iibr_core.training.scenes.textures import is_cut
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
@@ -84,10 +82,7 @@ def cast(
         part = slice(first, first + CHUNK_PIXELS)
         _cast(x[part], y[part], rays, view, colors[part], disparity[part])
 
-    if len(x) <= CHUNK_PIXELS:
-        chunk(0)
-    else:
-        list(_threads().map(chunk, range(0, len(x), CHUNK_PIXELS)))
+    in_pieces(chunk, range(0, len(x), CHUNK_PIXELS), THREADS)
     return colors, disparity
 
 
@@ -117,11 +112,6 @@ def is_visible_from(
 def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:
     """Return values in double precision, NaN as 0, infinite and far ones within +-FARTHEST."""
     return np.clip(np.nan_to_num(np.asarray(values, np.float64)), -FARTHEST, FARTHEST)
-
-
-@lru_cache(maxsize=1)
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rays")
 
 
 def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -137,4 +137,4 @@ def test_no_thread_is_left_when_the_window_closes(viewer):
     viewer.close()
     # Pools of the core, which other tests use in this process, are nobody's to close.
     names = [thread.name for thread in threading.enumerate()]
-    assert not [name for name in names if name.startswith("iibr-") and not name.startswith(("iibr-rays", "iibr-bands"))]
+    assert not [name for name in names if name.startswith("iibr-") and not name.startswith("iibr-bands")]
