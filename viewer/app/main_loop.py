@@ -84,8 +84,6 @@ class App:
         self.sharpener = Sharpener(self._gl, self.scene_view, self.window.wake)
         self.free_camera_view = FreeCameraView(self.scene_view, self.window.wake)
         view, wake = self.inspection_view, self.window.wake
-        newest_gloss = Newest("iibr-gloss", find_gloss, wake)
-        self.gloss_finder = Finder(newest_gloss, self._gloss_request, self.scene_view.take_gloss)
         self._tracker = Tracker(self.window.wake)
         self.receiver = Receiver(self.window.wake)
         self._ui = UiHost(self.look(), self.window.handle)
@@ -94,11 +92,13 @@ class App:
         self._side_effects = SideEffects(self.scene_view, self.window.wake, self.window.clipboard_text)
         self._sessions = SessionStore(kept_in, self.window.wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
-        newest_entropy, give_up = Newest("iibr-entropy", EntropyWork(), wake), lambda: [do(selection.deselect)]
+        entropy, no_overlay = Newest("iibr-entropy", EntropyWork(), wake), do(inspection.set_overlay, None)
+        surface, no_surface = Newest("iibr-surface", SurfaceWork(), wake), do(selection.deselect)
+        gloss = Newest("iibr-gloss", find_gloss, wake)
         self._workers: tuple[Worker, ...] = (
-            Finder(newest_entropy, view.entropy_request, view.take_entropy, view.give_up_entropy),
-            Finder(Newest("iibr-surface", SurfaceWork(), wake), view.surface_request, view.take_surface, give_up),
-            self.gloss_finder,
+            Finder(entropy, view.entropy_request, view.take_entropy, no_overlay),
+            Finder(surface, view.surface_request, view.take_surface, no_surface),
+            Finder(gloss, self._gloss_request, self.scene_view.take_gloss),
             self.free_camera_view,
             self.stereo_screen,
             self._tracker,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Generic
 
 import numpy as np
@@ -30,15 +30,15 @@ OUTLINE_PX = 2
 """Width of the outline of a selected surface, in pixels of the photo."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class EntropyRequest:
     """A view of the plan of a photo. inpaint: the inpainter of the scene's views."""
 
     generation: int
     view: ViewIndex
-    loaded: LoadedPhoto
-    plan: ScenePlan
-    inpaint: str
+    loaded: LoadedPhoto = field(compare=False)
+    plan: ScenePlan = field(compare=False)
+    inpaint: str = field(compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +72,13 @@ class EntropyWork:
         post(Entropy(request.generation, request.view, np.rint(values * 255).astype(np.uint8)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class SurfaceRequest:
     """The stroke that would change a selected surface of a photo."""
 
     stroke: Stroke
     loaded: LoadedPhoto
-    plan: ScenePlan
+    plan: ScenePlan = field(compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,17 +120,17 @@ def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 class Finder(Generic[Request, Result]):
-    """Finds, in a thread, what the state wants. asked: the last request."""
+    """Finds, in a thread, what the state wants; equal requests are made once."""
 
     def __init__(
         self,
         newest: Newest[Request, Result],
         request_for: Callable[[AppState], Request | None],
         take: Callable[[Result], Sequence[Action] | None],
-        give_up: Callable[[], Sequence[Action]] = tuple,
+        give_up: Action | None = None,
     ) -> None:
-        """request_for: returns a request for what is missing. take: shows a result. give_up: called after a failure."""
-        self.asked: Request | None = None
+        """request_for: returns the request for what is wanted. take: shows a result. give_up: follows a failure."""
+        self._asked: Request | None = None
         self._newest, self._request_for, self._take, self._give_up = newest, request_for, take, give_up
         self.close = newest.close
 
@@ -139,12 +139,13 @@ class Finder(Generic[Request, Result]):
         actions: list[Action] = []
         while (result := self._newest.next_result()) is not None:
             if isinstance(result, Failed):
-                actions += [do(messages.notify, Notice(result.message, is_error=True)), *self._give_up()]
+                failure = do(messages.notify, Notice(result.message, is_error=True))
+                actions += [failure] if self._give_up is None else [failure, self._give_up]
             else:
                 actions += self._take(result) or ()
-        request = self._request_for(state)
-        if request is not None and request != self.asked:
-            self.asked = request
+        request, before = self._request_for(state), self._asked
+        self._asked = request
+        if request is not None and request != before:
             self._newest.submit(request)
         return actions
 

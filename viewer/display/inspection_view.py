@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
-from iibr_core.scenes.scene import LoadedPhoto, Scene
+from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset, ViewUpdate
 from viewer.background.maps import Entropy, EntropyRequest, Surface, SurfaceRequest
@@ -24,7 +24,7 @@ from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
-from viewer.model import inspection, selection
+from viewer.model import selection
 from viewer.model.action import Action, do
 from viewer.model.colormap import VIRIDIS
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, sheet_cells, view_near
@@ -72,9 +72,7 @@ class InspectionView:
         self._on_sheet = np.zeros((0, 0), int)
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
         self._entropy: Entropy | None = None
-        self._entropy_asked: tuple[int, ViewIndex] | None = None
         self._surface: Surface | None = None
-        self._surface_asked: tuple[object, LoadedPhoto] | None = None
         self._snapshot: tuple[object, PictureDrawing] | None = None
         self._probed: tuple[object, Probe | None] = (None, None)
 
@@ -82,7 +80,7 @@ class InspectionView:
         """Forget the scene before."""
         self._inpainted.clear()
         self._drawn.clear()
-        self._entropy = self._entropy_asked = None
+        self._entropy = None
         self._stop_snapshot()
 
     @property
@@ -124,36 +122,27 @@ class InspectionView:
         return self._probed[1]
 
     def entropy_request(self, state: AppState) -> EntropyRequest | None:
-        """Return the entropy map to be computed now; None where none is wanted, or it was asked for before."""
+        """Return the entropy map to be computed; None if none is wanted, or it is known."""
         scene, view = state.scene, self._scene_view
         if scene is None or scene.plan is None or view.loaded is None or state.inspection.overlay != "entropy":
             return None
-        asked = view.generation, view_near(state.optics.eye, scene.grid)
-        if asked == self._entropy_asked or view.generation != state.generation:
+        wanted = view.generation, view_near(state.optics.eye, scene.grid)
+        is_known = self._entropy is not None and (self._entropy.generation, self._entropy.view) == wanted
+        if is_known or view.generation != state.generation:
             return None
-        self._entropy_asked = asked
-        return EntropyRequest(*asked, view.loaded, scene.plan, scene.source.inpaint)
+        return EntropyRequest(*wanted, view.loaded, scene.plan, scene.source.inpaint)
 
     def take_entropy(self, entropy: Entropy) -> None:
         """Show an entropy map."""
         self._entropy = entropy
 
-    def give_up_entropy(self) -> list[Action]:
-        """Take the overlay away; it may be asked for again."""
-        self._entropy_asked = None
-        return [do(inspection.set_overlay, None)]
-
     def surface_request(self, state: AppState) -> SurfaceRequest | None:
-        """Return the surface to be found now; None where none is selected, or it was asked for before."""
+        """Return the surface to be found; None if none is selected."""
         scene, loaded = state.scene, self._scene_view.loaded
         if state.selection is None or scene is None or scene.plan is None or loaded is None:
-            self._surface = self._surface_asked = None
+            self._surface = None
             return None
-        asked = selection.surface_stroke("forward", state.selection, state.brush)
-        if self._surface_asked is not None and self._surface_asked[0] == asked and self._surface_asked[1] is loaded:
-            return None
-        self._surface_asked = asked, loaded
-        return SurfaceRequest(asked, loaded, scene.plan)
+        return SurfaceRequest(selection.surface_stroke("forward", state.selection, state.brush), loaded, scene.plan)
 
     def take_surface(self, surface: Surface) -> list[Action]:
         """Show the selected surface."""

@@ -23,7 +23,7 @@ def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer):
     make_glossy(viewer)
     shiny = viewer.image()
     assert np.abs(shiny.astype(int) - plain).max() > 3
-    request = viewer.app.gloss_finder.asked
+    previews = viewer.app.scene_view.previews
     x, y = viewer.find("light ball")
     viewer.send("mousemove", x, y, "mousedown", 1)
     viewer.app.step()
@@ -32,7 +32,7 @@ def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer):
     viewer.send("mouseup", 1)
     viewer.until_idle()
     assert not np.array_equal(viewer.image(), shiny)
-    assert viewer.app.gloss_finder.asked is request, "the light needs no new maps"
+    assert viewer.app.scene_view.previews == previews, "the light needs no new maps"
     viewer.send("key", "ctrl+z")
     viewer.send("key", "ctrl+z")
     viewer.settle(lambda app: app.state.optics.gloss is None)
