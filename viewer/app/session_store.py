@@ -90,7 +90,8 @@ class SessionStore:
 
     def _follow(self, settings: SavedSettings) -> None:
         saved = self._saved
-        is_estimated = saved is not None and settings.source == saved.source and _model(settings) != _model(saved)
+        is_same = saved is not None and (saved.source, saved.focused_at) == (settings.source, settings.focused_at)
+        is_estimated = saved is not None and is_same and _model(settings) != _model(saved)
         if saved is None or (self._latest == saved and is_estimated):
             self._saved = self._latest = settings  # as it was opened: the user has changed nothing
         elif settings != self._latest:

@@ -65,7 +65,7 @@ class SideEffects:
 
     def advance(self, state: AppState) -> list[Action]:
         """Begin the state's tasks, draw for files, and return the results of earlier tasks."""
-        actions: list[Action] = [do(forget_tasks)] if state.tasks else []
+        actions: list[Action] = [do(forget_tasks, len(state.tasks))] if state.tasks else []
         actions += self._take_results() + self._take_answer(state)
         while (result := self._downloads.next_result()) is not None:
             actions += actions_of_download(result)

@@ -51,6 +51,6 @@ def ask(state: AppState, task: Task) -> AppState:
     return state.with_tasks(task)
 
 
-def forget_tasks(state: AppState) -> AppState:
-    """Forget the tasks that were taken up."""
-    return replace(state, tasks=())
+def forget_tasks(state: AppState, count: int) -> AppState:
+    """Forget the first tasks, which were taken up."""
+    return replace(state, tasks=state.tasks[count:])

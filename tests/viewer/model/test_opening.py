@@ -14,13 +14,14 @@ from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from viewer.model import history, lens, messages, opening, saving
-from viewer.model.action import do
+from viewer.model.action import ask, do, forget_tasks
 from viewer.model.messages import MAX_NOTICES
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import JobProgress
 from viewer.model.state.saving import SavedSettings
+from viewer.model.state.tasks import PlainTask
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)
@@ -189,3 +190,8 @@ def test_notices_are_kept_once_bounded_and_dismissable():
     assert [notice.text for notice in state.notices] == [str(i) for i in range(3, MAX_NOTICES + 3)]
     state = reduce(state, do(messages.dismiss, Notice("5")))
     assert [notice.text for notice in state.notices] == ["3", "4", "6", "7"]
+
+
+def test_a_task_that_comes_while_others_are_taken_up_stays():
+    state = ask(ask(AppState(), PlainTask("copy")), PlainTask("paste"))
+    assert forget_tasks(state, 1).tasks == (PlainTask("paste"),)
