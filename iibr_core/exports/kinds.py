@@ -15,6 +15,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.formats.animations import VIDEOS, even_size, video_width
 from iibr_core.formats.light_fields.write import check_light_field
 from iibr_core.formats.outputs import check_output, check_output_folder
+from iibr_core.scenes.lens_limits import focus_span
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ImageSize, InputError
@@ -30,6 +31,8 @@ Target = Literal["headset"]
 HEADSET_GRID = GridShape(5, 9)
 """Grid of a photo's views for headsets: between both eyes lie three views, and a head moves more to the sides."""
 STACK_BITS = 8, 16
+SOFT_SHARE = 0.1
+"""Default width of a mask's soft ends, as a share of the range of the focus."""
 MAX_SIDE_VIEWS = 33
 """Largest number of views a side that the window offers."""
 DEFAULT_SIZE = ScreenSize(0, 0)
@@ -57,7 +60,9 @@ class ExportOptions:
     whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit. credit:
     whether the page names the photo's title, author and rights. target: device that shows the page, None for any
     browser. layout: place of the depth map beside its picture. bits: bits a channel of the pictures of a stack. grid:
-    views of a photo that are written, None for those of the scene.
+    views of a photo that are written, None for those of the scene. at: place (x, y) of a surface, in pixels of the
+    photo. tolerance: factor of the contrast that ends it. soft: disparity over which the ends of a mask fade; negative
+    for the default.
     """
 
     size: ScreenSize = DEFAULT_SIZE
@@ -76,6 +81,9 @@ class ExportOptions:
     layout: DepthLayout = "right"
     bits: int = 8
     grid: GridShape | None = None
+    at: tuple[float, float] | None = None
+    tolerance: float = 1.0
+    soft: float = -1.0
 
 
 DEFAULT_OPTIONS = ExportOptions()
@@ -126,6 +134,7 @@ class ExportKind:
 
 MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
+GREY = (".png", ".tif", ".tiff")
 EYES = ("focus", "aperture", "size", "eyes")
 GRID = ("grid",)
 STACK_FILES = r"(focus_\d+|all_in_focus)\.png|disparity\.pfm"
@@ -190,6 +199,17 @@ EXPORTS = {
     "depth": ExportKind(
         "Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False, purpose="software"
     ),
+    "blur": ExportKind(
+        "Defocus map, EXR", (".exr",), "lens_maps:write_blur", ("focus", "defocus"), has_colors=False,
+        purpose="software",
+    ),
+    "depth-mask": ExportKind(
+        "Mask of what is in focus", GREY, "lens_maps:write_depth_mask", ("focus", "soft"), has_colors=False,
+        purpose="software",
+    ),
+    "matte": ExportKind(
+        "Matte of a surface", GREY, "matte:write_matte", ("at", "tolerance"), has_colors=False, purpose="software"
+    ),
     "splats": ExportKind("Gaussian splats", (".ply", ".spz"), "points:write_gaussians", purpose="software"),
     "mesh": ExportKind("Textured mesh, GLB", (".glb",), "mesh:write_mesh", purpose="software"),
     "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud", purpose="software"),
@@ -228,6 +248,7 @@ def with_defaults(kind: ExportKind, options: ExportOptions, scene: Scene, optics
         frames=frames,
         rate=rate,
         row=options.row if options.row >= 0 else scene.height // 2,
+        soft=options.soft if options.soft >= 0 else SOFT_SHARE * focus_span(scene),
         grid=options.grid if options.grid is not None and scene.plan is not None else scene.grid,
     )
 

@@ -18,6 +18,7 @@ from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.f_numbers import aperture_of
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, clamp_optics, first_aperture
 from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, InputError, ViewOffset
 
 MIN_F_NUMBER = 0.1
@@ -157,18 +158,16 @@ def _words(name: str) -> str:
 
 def _disparity_at(place: tuple[float, float], scene: Scene, disparity: FloatImage | None) -> float:
     """Return the disparity at a place of the photo, in pixels of its own size. Raises InputError without one."""
-    x, y = pixel_at(place, scene)
+    (x, y), (width, height) = place, require_inside(place, scene)
     if disparity is None:
-        raise InputError(f"focus at {place[0]:g},{place[1]:g}: {scene.name} has no depth; give a disparity in focus")
-    return float(disparity[y, x])
+        raise InputError(f"focus at {x:g},{y:g}: {scene.name} has no depth; give a disparity in focus")
+    return float(disparity[int(y * scene.height / height), int(x * scene.width / width)])
 
 
-def pixel_at(place: tuple[float, float], scene: Scene) -> tuple[int, int]:
-    """Return the pixel (x, y) of a view at a place of the photo, in pixels of its own size.
-
-    Raises InputError outside the photo.
-    """
-    (x, y), (width, height) = place, scene.own_size or scene.size
-    if not (0 <= x < width and 0 <= y < height):
-        raise InputError(f"{x:g},{y:g}: lies outside the picture; give x below {width} and y below {height}")
-    return int(x * scene.width / width), int(y * scene.height / height)
+def require_inside(place: tuple[float, float], scene: Scene) -> ScreenSize:
+    """Return the photo's own size. Raises InputError for a place (x, y) outside it, in its pixels."""
+    (x, y), size = place, scene.own_size or scene.size
+    if not (0 <= x < size.width and 0 <= y < size.height):
+        limits = f"x below {size.width} and y below {size.height}"
+        raise InputError(f"{x:g},{y:g}: lies outside the picture; give {limits}")
+    return size

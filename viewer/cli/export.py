@@ -79,6 +79,5 @@ def export(
         with show_progress("exporting"):
             message = write_export(kind, target, opened, options)
     print(target)
-    print_notes(
-        *opened.scene.notes, *lens.notes(opened.optics, opened.scene), message, origin=opened.scene.depth_origin
-    )
+    notes = lens.notes(opened.optics, opened.scene, "aperture" in kind.supports)
+    print_notes(*opened.scene.notes, *notes, message, origin=opened.scene.depth_origin)

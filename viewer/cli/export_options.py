@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from iibr_core.depth.editing.edits import TOLERANCE_LIMITS
 from iibr_core.exports import kinds
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.formats.quilts import DEVICES
@@ -16,7 +17,7 @@ from iibr_core.runtime.extras import require_extra
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.cli.option_records import flag, option
-from viewer.cli.options import LensOptions, name_in, require_not_given, size_from_text
+from viewer.cli.options import LensOptions, Pair, name_in, pair_from_text, require_not_given, size_from_text
 
 MAX_BUDGET_BYTES = 10**9
 To = Annotated[str, option(f"{', '.join(EXPORTS)}.", "KIND", "", "--to", parser=name_in(EXPORTS))]
@@ -44,6 +45,7 @@ FRAMES_TEXT = "Number of frames of an animation or pictures of a focal stack."
 FRAMES_DEFAULT = f"{kinds.DEFAULT_SECONDS:g} s; {defaults_of('frames')}"
 SIZE_DEFAULT = f"the photo's; largest width: {defaults_of('max_width_px')}"
 SLOWEST, FASTEST = kinds.RATE_LIMITS
+MIN_TOLERANCE, MAX_TOLERANCE = TOLERANCE_LIMITS
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,25 @@ class KindOptions:
         kinds.Target | None, option("Device for a web page: headset takes a finer grid.", None, "any browser", "--for")
     ] = None
 
+    at: Annotated[
+        Pair | None,
+        option("Place of a matte's surface, in pixels from the left and the top.", "X,Y", parser=pair_from_text),
+    ] = None
+    tolerance: Annotated[
+        float | None,
+        option(
+            "Factor of the contrast at which a matte's surface ends.",
+            "X",
+            "1",
+            min=TOLERANCE_LIMITS[0],
+            max=TOLERANCE_LIMITS[1],
+        ),
+    ] = None
+    soft: Annotated[
+        float | None,
+        option("Disparity over which a depth mask fades at both ends.", "X", "a tenth of the scene's", min=0),
+    ] = None
+
     def finer(self, source: Source) -> Source:
         """Return the source with the grid that the device needs, unless a grid is given."""
         is_open = self.target == "headset" and source.grid is None
@@ -93,8 +114,9 @@ KIND_SPECIFIC_OPTIONS = {"keys", "row", "show", *(field.name for field in (*fiel
 LENS_WORDS = {
     "focus": ("focus_at", "focus_range", "tilt"),
     "aperture": ("f_number", "blades", "roundness", "rotation", "ring", "cat_eye", "mask", "highlights"),
+    "defocus": ("aperture", "f_number"),
 }
-"""Options that come with the focus and with the aperture."""
+"""Options that come with the focus, with an aperture, and with its width alone."""
 
 
 def require_kind(context: typer.Context, name: str) -> kinds.ExportKind:

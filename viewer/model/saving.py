@@ -135,6 +135,19 @@ def as_other_kind(state: AppState, prompt: ExportPrompt, name: str) -> ExportPro
     return ExportPrompt(name, str(path.with_name(f"{stem}{kind.endings[0] if kind.endings else ''}")))
 
 
+def picked_place(state: AppState) -> tuple[float, float] | None:
+    """Return the place (x, y) that was selected, or else put in focus by a click, in pixels of the photo."""
+    scene, place = state.scene, None
+    if state.selection is not None:
+        place = state.selection.place
+    elif state.focused_at is not None:
+        place = state.focused_at[0] / 2 + 0.5, state.focused_at[1] / 2 + 0.5
+    if scene is None or place is None:
+        return None
+    size = scene.own_size or scene.size
+    return place[0] * size.width, place[1] * size.height
+
+
 def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOptions) -> Path:
     """Return the path that is written for a typed path: with an ending if it has none, and with the tag that players
     read from the name. Raises InputError without a name, and as `export_path` does.

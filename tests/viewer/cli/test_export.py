@@ -52,6 +52,21 @@ def test_the_lens_of_a_drawn_kind_has_the_options_of_a_screenshot(iibr, photo):
     )
 
 
+def test_maps_for_editors_take_the_lens_but_no_shape(iibr, photo):
+    lens = ("--focus-at", "48,32", "--f-number", 2)
+    done = iibr("export", photo, "--to", "blur", "-o", "blur.exr", *lens)
+    assert output_of(done) == "blur.exr\n"
+    assert "Values are the radius of the disc of defocus in pixels, positive before the focus" in done.stderr
+    assert "--blades: not for --to blur" in refusal_of(
+        iibr("export", photo, "--to", "blur", "-o", "b.exr", *lens, "--blades", 5)
+    )
+    done = iibr("export", photo, "--to", "depth-mask", "-o", "mask.png", "--focus-range", 0.1, "--soft", 0.2)
+    assert (output_of(done), "closed lens" in done.stderr) == ("mask.png\n", False)
+    assert "which surface? give a place" in refusal_of(iibr("export", photo, "--to", "matte", "-o", "m.png"))
+    output_of(iibr("export", photo, "--to", "matte", "-o", "m.png", "--at", "48,32", "--tolerance", 2))
+    assert np.asarray(Image.open("m.png"))[32, 48] > 65000
+
+
 def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr, photo):
     words = ("export", photo, "-o", "a.html", "--for", "headset", "--to")
     for grid, views in (((), 45), (("--grid", 3), 9)):

@@ -13,6 +13,7 @@ from iibr_core.types import InputError
 from tests.viewer.model.test_opening import scene_of, state_with
 from viewer.model import saving
 from viewer.model.saving import MAX_FILES, as_other_kind, first_kind, kinds_for, usual_export_path, written_path
+from viewer.model.state.depth import Selection
 from viewer.model.state.prompts import ExportPrompt, SavePrompt
 
 STATE = state_with(replace(scene_of(source=Source("/photos/bike.jpg")), name="bike"))
@@ -85,3 +86,13 @@ def test_files_that_were_written_or_failed_are_listed_the_latest_first():
     assert len(state.files) == MAX_FILES
     assert state.files[0].problem == state.notices[-1].text == "the disk is full"
     assert state.notices[-2].text == "Exported /a/13.gif"
+
+
+def test_a_matte_is_of_the_selected_surface_or_of_the_one_put_in_focus():
+    """In pixels of the photo, which may be larger than its views."""
+    scene = replace(STATE.scene, own_size=ScreenSize(400, 300))
+    state = replace(STATE, scene=scene)
+    assert saving.picked_place(state) is None
+    focused = replace(state, focused_at=(0.5, -1.0))
+    assert saving.picked_place(focused) == (300, 0)
+    assert saving.picked_place(replace(focused, selection=Selection((0.25, 0.5)))) == (100, 150)

@@ -10,10 +10,11 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.depth.editing.edits import TOLERANCE_LIMITS
 from iibr_core.exports import kinds
 from iibr_core.exports.kinds import EXPORTS, AnimationKind, ExportKind, ExportOptions, Purpose
 from iibr_core.formats.quilts import DEVICES
-from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.lens_limits import clamp, focus_span
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, InputError
 from viewer.model import messages, saving
@@ -23,7 +24,7 @@ from viewer.model.state.preferences import is_seen_open
 from viewer.model.state.prompts import ExportPrompt
 from viewer.model.state.tasks import ExportTask
 from viewer.ui.overlays.prompt_rows import WIDTH_FIELD, choice_row, place_actions, place_row, size_row, text_field
-from viewer.ui.widgets import checkbox, choices, gap, label, quiet, scale, slider
+from viewer.ui.widgets import checkbox, choices, gap, label, percent_slider, quiet, scale, slider
 
 ADVANCED_ROWS = ("keys",)
 """Rows that are shown once the panel's advanced section was opened."""
@@ -48,11 +49,12 @@ MOTION_TIPS: dict[AnimationKind, str] = {
 
 @dataclass(frozen=True)
 class _Export:
-    """Data for the rows."""
+    """Data for the rows. picked: place (x, y) that was clicked last, in pixels of the photo, None without."""
 
     kind: ExportKind
     scene: Scene
     optics: Optics
+    picked: tuple[float, float] | None = None
 
 
 Row = Callable[[ExportOptions, _Export], ExportOptions]
@@ -75,7 +77,12 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
         return [do(messages.show_prompt, saving.as_other_kind(state, prompt, chosen))]
     kind, scene = EXPORTS[chosen], state.scene
     is_advanced = is_seen_open("advanced", state.preferences.open_sections)
-    edited = replace(prompt, options=_option_rows(prompt.options, _Export(kind, scene, state.optics), is_advanced))
+    edited = replace(
+        prompt,
+        options=_option_rows(
+            prompt.options, _Export(kind, scene, state.optics, saving.picked_place(state)), is_advanced
+        ),
+    )
     row_of_path = place_row("File" if kind.endings else "Folder", prompt.path, state, prompt.problem)
     written = _written_name(kind, edited, scene)
     if written and written != Path(prompt.path.strip()).name:
@@ -234,7 +241,28 @@ def _credit(options: ExportOptions, export: _Export) -> ExportOptions:
     return replace(options, credit=checkbox("title, author, copyright", options.credit, tip))
 
 
+def _at(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Surface", "Click a surface in the picture, or select it, before you export.")
+    place = export.picked
+    quiet("none was clicked yet" if place is None else f"the one at {place[0]:.0f}, {place[1]:.0f}, clicked last")
+    return replace(options, at=place)
+
+
+def _tolerance(options: ExportOptions, export: _Export) -> ExportOptions:
+    tip = "Contrast that ends the surface: higher values take in more."
+    tolerance = percent_slider("Tolerance", options.tolerance, tip, True, TOLERANCE_LIMITS, is_logarithmic=True)
+    return replace(options, tolerance=tolerance)
+
+
+def _soft(options: ExportOptions, export: _Export) -> ExportOptions:
+    span, tip = focus_span(export.scene), "How softly the mask ends before and behind the range in focus."
+    return replace(options, soft=span * percent_slider("Soft ends", options.soft / span, tip))
+
+
 ROWS: dict[str, Row] = {
+    "at": _at,
+    "tolerance": _tolerance,
+    "soft": _soft,
     "device": _device,
     "motion": _motion,
     "keys": _keys,
