@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.exports.kinds import ExportOptions
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape
 from viewer.app.pace import NoticeClock
 from viewer.model import messages, preferences, saving
 from viewer.model.action import do
@@ -83,15 +81,6 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer):
     is_beside = tip.pos.x + tip.size.x <= prompt.pos.x
     assert is_beside or tip.pos.y >= prompt.pos.y + prompt.size.y or tip.pos.y + tip.size.y <= prompt.pos.y
     assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
-
-
-def test_the_number_of_views_of_a_light_field_is_set_in_the_prompt(viewer):
-    viewer.do(do(messages.show_prompt, ExportPrompt("hci", "field")))
-    viewer.press("##views", "prompt ExportPrompt")
-    viewer.type("7")
-    viewer.send("key", "Tab")
-    wanted = ExportPrompt("hci", "field", ExportOptions(grid=GridShape(7, 7)))
-    viewer.until(lambda app: app.state.prompt == wanted)
 
 
 def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer):

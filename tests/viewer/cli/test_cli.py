@@ -13,19 +13,26 @@ from PIL import Image
 
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
+from iibr_core.scenes.scene import Source
 from iibr_core.types import TOTAL_PARALLAX, GridShape, ImageSize, ViewOffset
 from tests.forked_iibr import run_forked
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.known_scenes import write_llff_row
 from tests.viewer.cli.conftest import output_of, refusal_of
 from tests.viewer.conftest import HEIGHT, WIDTH
+from viewer.app.picture_files import export_picture, shot_of
 from viewer.cli.export_options import budget_from_text
 from viewer.cli.main import COMMANDS
 from viewer.cli.options import grid_from_text, number_from_text, size_from_text, view_from_text
+from viewer.display.offscreen import OffscreenScene
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.demo_photo import demo_photo
 
 ROOT = Path(__file__).parents[3]
@@ -197,6 +204,16 @@ def test_like_repeats_a_saved_picture_except_for_given_options(iibr, photo_path,
     output_of(iibr("screenshot", photo_path, "--like", first, "--aperture", 0, "-o", other))
     assert read_photo(other).size == (100, 150)
     assert (read_photo(other).pixels != read_photo(first).pixels).any()
+
+
+def test_like_repeats_edits_of_the_depth(iibr, photo_path, tmp_path):
+    first, again = tmp_path / "first.png", tmp_path / "again.png"
+    with OffscreenScene("egl") as viewer:
+        viewer.open(Source(str(photo_path), grid=GridShape(3, 3)), edits=DepthEdits(is_inverted=True))
+        viewer.do(do(lens.move_eye, ViewOffset(-1, 0.5)))
+        export_picture(first, viewer.picture(), shot_of(viewer.state, viewer.scene.size, PictureFormat()))
+    output_of(iibr("screenshot", photo_path, "--like", first, "-o", again))
+    np.testing.assert_allclose(read_photo(again).pixels, read_photo(first).pixels, atol=1.01 / 255)
 
 
 def test_a_screenshot_is_woven_for_a_display(iibr, photo_path, tmp_path):

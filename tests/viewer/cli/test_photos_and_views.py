@@ -45,6 +45,11 @@ def test_depth_of_a_pair_is_the_left_views(iibr, folder, monkeypatch, reduced_fo
     assert ("note: Found from views reduced to " in done.stderr) == (reduced_for != "nothing")
     error = np.abs(read_pfm(Path("a.pfm"))[::times, ::times] / (2 * times) - disparity_of_square())[4:-4, 4:-4]
     assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
+    if reduced_for == "nothing":
+        for name, eye in zip(("left.png", "other.png"), eyes):
+            Image.fromarray(eye).save(name)
+        output_of(iibr("depth", "left.png", "other.png", "-o", "b.pfm"))
+        assert np.mean(np.abs(read_pfm(Path("b.pfm")) - read_pfm(Path("a.pfm"))) < 0.2) > 0.9
 
 
 @pytest.mark.parametrize(
@@ -136,9 +141,12 @@ def test_the_cameras_of_a_light_field_see_its_views(iibr, photo_path, folder, ki
         assert np.sqrt(np.mean((pixels_of(view) - pixels_of(other)) ** 2)) < 0.02
 
 
-def test_a_step_forward_makes_the_photo_larger(iibr, photo_path, folder):
-    poses = write_poses((0, 0, 0), (0, 0, -0.25))
-    output_of(iibr("generate", photo_path, "--poses", poses, "--photo-pose", "1", "-o", "new"))
+@pytest.mark.parametrize(("words", "nearest"), [((), 1.0), (("--literal",), 1.2 * WIDTH / (NEAR + 3))])
+def test_a_step_forward_makes_the_photo_larger(iibr, photo_path, folder, words, nearest):
+    """By a quarter of the distance of the nearest surface, which is 1, or literally the focal length / disparity."""
+    np.save(photo_path.with_name("scene_disparity.npy"), np.load(photo_path.with_name("scene_disparity.npy")) + 3)
+    poses = write_poses((0, 0, 0), (0, 0, -nearest / 4))
+    output_of(iibr("generate", photo_path, "--poses", poses, "--photo-pose", "1", *words, "-o", "new"))
     still, forward = (pixels_of(path) for path in sorted(Path("new").iterdir()))
     np.testing.assert_array_equal(still, pixels_of(photo_path))
     red = [(image[..., 0] > image[..., 1] + 0.2).sum() for image in (still, forward)]

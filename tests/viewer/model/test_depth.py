@@ -101,6 +101,8 @@ def test_the_same_scene_planned_anew_keeps_its_edits_until_they_are_undone_or_re
     state = opening.show_scene(edited, edited.generation, again)
     assert state.depth == edited.depth
     assert history.undo(state).depth == depth.reset(state).depth == DepthSettings()
+    as_given = depth.set_tone(opened(Source("a.png", DepthChoice(refine=False))), TONE, True)
+    assert depth.reset(as_given).depth == DepthSettings(False), "as the photo was opened"
 
 
 def test_a_map_is_for_the_photo_that_is_open_and_another_photo_keeps_the_choice_of_depth():

@@ -285,9 +285,11 @@ def test_a_look_is_given_to_another_photo_with_its_own_focus_and_strokes():
     assert state.depth.edits.strokes
     other = scene_of(GridShape(5, 5), state.source, plan=plan_of(GridShape(5, 5)), disparity_range_px=(-1.0, 1.5))
     before = after(state, do(opening.show_scene, state.generation, other), do(lens.set_focus, 1.0))
+    before = after(before, do(depth.paint, (0.2, 0.2)), do(gesture.end_gesture))
     state = after(before, do(look.paste_look))
     wanted = replace(before.optics, aperture_diameter=3.6, focus_range=0.6, exposure_stops=1.0, highlight_recovery=0.5)
     assert state.optics == replace(wanted, aperture_shape=ring), "half open, too; the rest is its own"
-    assert (state.depth.edits, state.depth_strength) == (DepthEdits(gamma=1.5), 2.0)
+    assert state.depth.edits == DepthEdits(gamma=1.5, strokes=before.depth.edits.strokes) != DepthEdits(gamma=1.5)
+    assert state.depth_strength == 2.0
     assert state.generation == before.generation + 1
     assert history.undo(state).optics == before.optics

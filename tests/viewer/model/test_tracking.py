@@ -135,6 +135,7 @@ def test_the_filter_starts_again_after_a_pause_and_takes_packets_of_one_moment()
 
 
 def test_the_first_place_of_the_head_is_the_centre():
+    assert tracked(0j).tracking.latency_ms == 5.0
     state = replace(tracking.switch(state_with(FIVE), "udp"), optics=replace(AppState().optics, eye=ViewOffset(1, -1)))
     assert followed(state, 40 - 9j).optics.eye == pytest.approx((1, -1))
     assert followed(state, 40 - 9j, 55 - 9j).optics.eye.s > 0

@@ -53,7 +53,11 @@ def test_the_frame_stays_within_the_room_and_in_the_picture(zoom):
     frame, room, across = layout.frame, layout.room, layout.strip_across
     assert frame.within(room) == frame
     assert across.y + across.height <= WINDOW.height
-    part = layout.part
+    part, small = layout.part, layout.minimap
+    if small is not None:
+        corner = frame.x + frame.width - small.x - small.width, frame.y + frame.height - small.y - small.height
+        assert corner[0] == pytest.approx(corner[1])
+        assert 0 < corner[0] < 20, "in the lower right corner"
     edge = 1 / frame.width
     assert -edge <= part.x <= part.x + part.width <= 1 + edge
     assert -edge <= part.y <= part.y + part.height <= 1 + edge

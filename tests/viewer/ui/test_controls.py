@@ -152,6 +152,7 @@ def test_a_button_or_box_does_what_it_says(operated, row):
         ("gif", "##width", 48, "size", ScreenSize(48, 32)),
         ("focal-stack", "##frames", 7, "frames", 7),
         ("web", "##budget", 2.5, "budget", 2_500_000),
+        ("hci", "##views", 5, "grid", GridShape(5, 5)),
     ],
 )
 def test_an_option_of_an_export_is_set_in_its_unit(operated, kind, widget, given, option, value):

@@ -95,3 +95,6 @@ def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(f
     first.do(do(window.set_narrow, False))
     first.do(toggle.action(first.state))
     assert first.state.is_panel_hidden
+    full = reduce(AppState(hides_panel=False), do(window.set_fullscreen, True))
+    assert full.is_panel_hidden
+    assert reduce(full, do(window.set_fullscreen, False)).hides_panel is False, "as the user had it"
