@@ -43,22 +43,25 @@ class TwoPlanes:
         waves = [np.sin(0.31 * x + 0.17 * y + hue), np.sin(0.11 * x - 0.29 * y + 2 * hue), np.sin(0.23 * y + hue)]
         return 0.5 + self.contrast * np.stack(waves, axis=-1) + 0.1 * np.cos(hue)
 
-    def open(self, renderer, grid, with_disparity=True):
-        """Open an empty field of this scene's size."""
-        renderer.open_field(grid, self.width, self.height, hdr=False, with_disparity=with_disparity)
+    def open(self, renderer, grid, with_disparity=True, row_step=1.0):
+        """Open an empty field of this scene's size. row_step: distance of rows, in columns."""
+        size = self.width, self.height
+        renderer.open_field(grid, *size, hdr=False, with_disparity=with_disparity, row_step=row_step)
 
     def upload(self, renderer, grid, row, column, with_disparity=True):
         """Upload one view."""
-        colors, disparity = self.view(grid.offset(row, column))
+        t, s = grid.offset(row, column)
+        colors, disparity = self.view(ViewOffset(renderer.field.row_step * t, s))
         renderer.upload_view(row, column, colors, disparity if with_disparity else None)
 
-    def fill(self, renderer, grid, with_disparity=True):
+    def fill(self, renderer, grid, with_disparity=True, row_step=1.0):
         """Open the field and upload every view, and the surface behind the centre view's as the outer views show it."""
-        self.open(renderer, grid, with_disparity)
+        self.open(renderer, grid, with_disparity, row_step)
         for at in np.ndindex(*grid):
             self.upload(renderer, grid, *at, with_disparity)
         if with_disparity:
-            seen = [SeenBehind(at, *self.view(at), None) for at in outer_views_of_grid(grid)]
+            outer = [ViewOffset(row_step * at.t, at.s) for at in outer_views_of_grid(grid)]
+            seen = [SeenBehind(at, *self.view(at), None) for at in outer]
             colors, disparity = self.view(ViewOffset(0.0, 0.0))
             renderer.set_hidden(hidden_surface(encoded_from_stored(colors), disparity, max(grid), seen))
 

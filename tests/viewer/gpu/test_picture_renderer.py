@@ -59,14 +59,19 @@ def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer):
     assert rms(settled(renderer, optics, scene), truth, border=14) < 0.01
 
 
-@pytest.mark.parametrize(("focus", "diameter"), [(-1.0, 2.0), (2.0, 8.0)])
-def test_lens_against_brute_force(renderer, focus, diameter):
-    SCENE.fill(renderer, GRID)
-    optics = Optics(focus_disparity=focus, aperture_diameter=diameter)
+@pytest.mark.parametrize(
+    ("focus", "diameter", "eye", "row_step"),
+    [(-1.0, 2.0, CENTRE, 1.0), (2.0, 8.0, CENTRE, 1.0), (2.0, 4.0, ViewOffset(2.0, -0.5), 0.5)],
+)
+def test_lens_against_brute_force(renderer, focus, diameter, eye, row_step):
+    """Beside the middle, and where rows are closer than columns, what lies behind the photo is seen elsewhere."""
+    SCENE.fill(renderer, GRID, row_step=row_step)
+    optics = Optics(eye, focus_disparity=focus, aperture_diameter=diameter)
     image = settled(renderer, optics, SCENE)
-    likeness = psnr(image, through_lens(SCENE, optics), border=14)
+    seen = replace(optics, eye=ViewOffset(row_step * eye.t, eye.s))
+    likeness = psnr(image, through_lens(SCENE, seen), border=14)
     assert likeness > 38
-    for wrong in (replace(optics, focus_disparity=-focus), replace(optics, aperture_diameter=min(diameter, 5.0) / 2)):
+    for wrong in (replace(seen, focus_disparity=-focus), replace(seen, aperture_diameter=min(diameter, 5.0) / 2)):
         assert psnr(image, through_lens(SCENE, wrong), border=14) < likeness - 3
 
 
