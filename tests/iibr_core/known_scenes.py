@@ -7,7 +7,7 @@ import numpy as np
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import ViewOffset
-from tests.iibr_core.scenes import smooth_texture
+from tests.iibr_core.scenes import bilinear, smooth_texture
 
 HEIGHT, WIDTH = 40, 48
 FOREGROUND, WALL = 2.0, 0.5
@@ -20,15 +20,7 @@ def view_of_wall(offset: ViewOffset, disparity: float = WALL, size: tuple[int, i
     texture = smooth_texture(height + 2 * MARGIN, width + 2 * MARGIN)
     y = np.arange(height) + MARGIN + disparity * offset.t
     x = np.arange(width) + MARGIN + disparity * offset.s
-    top, left = np.floor(y).astype(int), np.floor(x).astype(int)
-    down, across = (y - top)[:, None, None], (x - left)[None, :, None]
-
-    def at(j: int, i: int) -> np.ndarray:
-        return texture[np.ix_(top + j, left + i)]
-
-    above = at(0, 0) * (1 - across) + at(0, 1) * across
-    below = at(1, 0) * (1 - across) + at(1, 1) * across
-    return np.asarray(above * (1 - down) + below * down, np.float32)
+    return np.asarray(bilinear(texture, *np.meshgrid(y, x, indexing="ij")), np.float32)
 
 
 def view_of_square(offset: ViewOffset) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from iibr_core.color import bytes_from_encoded
 from iibr_core.formats.images.write import write_image
+from tests.iibr_core.scenes import bilinear
 
 ROW_STEP, SIDE, SIZE = 0.4, 5, 96
 WALL_PX, SQUARE_PX = -1.0, 3.0
@@ -18,7 +19,7 @@ def seen(t: float | np.ndarray, s: float | np.ndarray, focus: float = 0.0) -> np
     y, x = y - focus * t, x - focus * s
     is_square = (abs(y + SQUARE_PX * t - 48) < 20) & (abs(x + SQUARE_PX * s - 48) < 20)
     wall, square = (
-        _bilinear(_texture(seed), y + disparity * t + 48, x + disparity * s + 48)
+        bilinear(_texture(seed), y + disparity * t + 48, x + disparity * s + 48)
         for seed, disparity in ((0, WALL_PX), (1, SQUARE_PX))
     )
     return np.where(is_square[..., None], square * np.float32([1.0, 0.8, 0.5]), wall * np.float32([0.5, 0.8, 1.0]))
@@ -31,14 +32,6 @@ def _texture(seed: int) -> np.ndarray:
     for axis in (0, 1, 0, 1):
         noise = (np.roll(noise, 1, axis) + 2 * noise + np.roll(noise, -1, axis)) / 4
     return np.clip(2 * noise - 0.5, 0, 1).astype(np.float32)
-
-
-def _bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    y0, x0 = y.astype(int), x.astype(int)
-    down, across = (y - y0)[..., None], (x - x0)[..., None]
-    above = image[y0, x0] * (1 - across) + image[y0, x0 + 1] * across
-    below = image[y0 + 1, x0] * (1 - across) + image[y0 + 1, x0 + 1] * across
-    return above * (1 - down) + below * down
 
 
 def write_unequal_rows(folder: Path) -> Path:

@@ -235,6 +235,10 @@ def test_a_map_lies_like_the_stored_photo_or_is_turned_itself(tmp_path, orientat
     for name in ("upright.png", "stored.png", "own_exif.jpg"):
         choice = DepthChoice(file=str(tmp_path / name), refine=False)
         assert_true_to_scene(open_with_depth(tmp_path / "turned.jpg", choice))
+    ramp = np.tile(np.linspace(0, 4, HEIGHT, dtype=np.float32)[:, None], (1, WIDTH))
+    np.save(tmp_path / "ramp.npy", ramp)
+    found = open_with_depth(tmp_path / "turned.jpg", DepthChoice(file=str(tmp_path / "ramp.npy"), refine=False))
+    np.testing.assert_allclose(found.disparity.values, ramp, atol=1e-5, err_msg="in doubt a map is upright")
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr"])

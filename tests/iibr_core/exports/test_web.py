@@ -210,9 +210,6 @@ def test_fields_that_browsers_cannot_hold_lose_views_then_size() -> None:
         assert count * height * width <= MAX_TEXELS
         assert count <= 300
     assert form == WebForm()
-
-
-def test_pages_for_headsets_have_smaller_views_rather_than_fewer() -> None:
     form = form_that_fits(GridShape(5, 9), ImageSize(1224, 1632), True, keeps_views=True)
-    assert form.every == 1
+    assert form.every == 1, "for headsets views are smaller rather than fewer"
     assert 0.99 * MAX_TEXELS <= 45 * np.prod(form.size_of(ImageSize(1224, 1632))) <= MAX_TEXELS

@@ -36,15 +36,8 @@ def test_equal_steps_are_predicted_once_the_pace_is_known_and_it_counts_down_bet
     assert left.share == 0.5, "more to do takes no progress back"
     assert left.update(1, 10, "another stage") is None
     assert left.share == 0.1
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [(0.2, "about 1 s left"), (8.4, "about 8 s left"), (42, "about 40 s left"), (89, "about 90 s left"),
-     (185, "about 3 min left"), (7200, "about 2.0 h left")],
-)  # fmt: skip
-def test_words(seconds, words) -> None:
-    assert about_left(seconds) == words
+    said = [about_left(seconds).removeprefix("about ") for seconds in (0.2, 42, 89, 185, 7200)]
+    assert said == ["1 s left", "40 s left", "90 s left", "3 min left", "2.0 h left"]
 
 
 @pytest.mark.parametrize(

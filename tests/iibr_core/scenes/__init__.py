@@ -16,6 +16,15 @@ def smooth_texture(height: int, width: int, seed: int = 0) -> np.ndarray:
     return (0.5 + 0.3 * np.stack(waves, axis=-1) / 8).astype(np.float32)
 
 
+def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return an image (H, W) or (H, W, C) at places (h, w) between its pixels."""
+    top, left = np.floor(y).astype(int), np.floor(x).astype(int)
+    down, across = (part.reshape(*part.shape, *[1] * (image.ndim - 2)) for part in (y - top, x - left))
+    above = image[top, left] * (1 - across) + image[top, left + 1] * across
+    below = image[top + 1, left] * (1 - across) + image[top + 1, left + 1] * across
+    return above * (1 - down) + below * down
+
+
 def photo_of(pixels: np.ndarray, is_hdr: bool = False) -> Photo:
     return Photo(np.asarray(pixels, np.float32), focal_px=100.0, name="test", is_hdr=is_hdr)
 

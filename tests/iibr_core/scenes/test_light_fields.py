@@ -17,6 +17,7 @@ from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
+from tests.iibr_core.scenes import bilinear
 from tests.viewer.conftest import reduce
 from viewer.model import lens, opening
 from viewer.model.action import do
@@ -156,13 +157,6 @@ def write_two_planes(folder: Path) -> Path:
         pixels = bytes_from_encoded(np.where(inside, parts[1], parts[0]))
         write_image_file(folder / "views" / f"v{row}_u{column}.png", np.repeat(pixels[..., None], 3, -1), "uint8")
     return folder
-
-
-def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    y0, x0 = y.astype(int), x.astype(int)
-    top = image[y0, x0] * (1 - x + x0) + image[y0, x0 + 1] * (x - x0)
-    bottom = image[y0 + 1, x0] * (1 - x + x0) + image[y0 + 1, x0 + 1] * (x - x0)
-    return top * (1 - y + y0) + bottom * (y - y0)
 
 
 def test_finding_disparity_can_be_stopped(tmp_path) -> None:

@@ -1,5 +1,6 @@
 """The order of a light field's views is found from their parallax, whatever their names say."""
 
+from collections.abc import Callable
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -57,32 +58,31 @@ def snake(rows: int, columns: int) -> list[tuple[int, int]]:
     return [(row, columns - 1 - column if row % 2 else column) for row, column in grid(rows, columns)]
 
 
+def named(rows: int, columns: int, stem: Callable[[int, int], str], row_step: float = 1.0) -> Names:
+    return {stem(r, c): centred(r, c, rows, columns, row_step) for r, c in grid(rows, columns)}
+
+
+BACKWARDS = "every other row runs backwards."
 FIELDS: dict[str, tuple[Names, str]] = {
-    "as named": ({f"v{r}_u{c}": centred(r, c) for r, c in grid(5, 5)}, ""),
-    "columns first": ({f"lf_{c}_{r}": centred(r, c) for r, c in grid(5, 5)}, "columns are counted before rows."),
-    "columns first, 3 rows of 5": (
-        {f"lf_{c}_{r}": centred(r, c, 3) for r, c in grid(3, 5)},
-        "3 rows of 5, columns are counted before rows.",
-    ),
+    "as named": (named(5, 5, "v{}_u{}".format), ""),
+    "columns first": (named(5, 5, "lf_{1}_{0}".format), "columns are counted before rows."),
+    "columns first, 3 rows of 5": (named(3, 5, "lf_{1}_{0}".format), "3 rows of 5, columns are counted before rows."),
     "column by column": (
-        {f"img_{5 * c + r:03d}": centred(r, c) for r, c in grid(5, 5)},
+        named(5, 5, lambda r, c: f"img_{5 * c + r:03d}"),
         "5 rows of 5, columns are counted before rows.",
     ),
-    "columns mirrored": ({f"v{r}_u{4 - c}": centred(r, c) for r, c in grid(5, 5)}, "columns run from right to left."),
-    "from behind": ({f"v{4 - r}_u{4 - c}": centred(r, c) for r, c in grid(5, 5)}, "as seen from behind."),
+    "columns mirrored": (named(5, 5, lambda r, c: f"v{r}_u{4 - c}"), "columns run from right to left."),
+    "from behind": (named(5, 5, lambda r, c: f"v{4 - r}_u{4 - c}"), "as seen from behind."),
     "serpentine": (
         {f"shot{k:02d}": centred(*at) for k, at in enumerate(snake(5, 5))},
-        "5 rows of 5, every other row runs backwards.",
+        f"5 rows of 5, {BACKWARDS}",
     ),
     "serpentine, 4 rows of 6": (
         {f"shot{k:02d}": centred(*at, 4, 6) for k, at in enumerate(snake(4, 6))},
-        "4 rows of 6, every other row runs backwards.",
+        f"4 rows of 6, {BACKWARDS}",
     ),
     "a row of 25": ({f"DSC_{1000 + k}": (0.0, (k - 12) / 2) for k in range(25)}, "one line of views."),
-    "rows 0.4 apart": (
-        {f"v{r}_u{c}": centred(r, c, row_step=0.4) for r, c in grid(5, 5)},
-        "rows are 0.4 times as far apart as columns.",
-    ),
+    "rows 0.4 apart": (named(5, 5, "v{}_u{}".format, 0.4), "rows are 0.4 times as far apart as columns."),
 }
 
 
