@@ -216,11 +216,14 @@ BY_NAME = {command.name: command for command in COMMANDS}
 
 
 def commands_matching(text: str, recent: tuple[Command, ...] = ()) -> tuple[Command, ...]:
-    """Return the commands whose names hold all words of a text, recent commands first; beginnings of words win."""
+    """Return the commands whose names hold all words of a text, recent commands first; beginnings of names win, then
+    those of words.
+    """
     words = text.lower().split()
 
-    def is_inside(command: Command) -> bool:
-        return not all(f" {word}" in f" {command.name.lower()}" for word in words)
+    def is_inside(command: Command) -> tuple[bool, bool]:
+        name = command.name.lower()
+        return not name.startswith(" ".join(words)), not all(f" {word}" in f" {name}" for word in words)
 
     found = (command for command in (*recent, *COMMANDS) if all(word in command.name.lower() for word in words))
     return tuple(sorted(found, key=is_inside))

@@ -106,3 +106,4 @@ def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path):
 def test_commands_with_a_word_that_begins_so_come_first():
     names = [command.name for command in commands_matching("entr")]
     assert names.index("Overlay: entropy") < names.index("Centre the head")
+    assert commands_matching("stereo display")[0].name == "Stereo display"

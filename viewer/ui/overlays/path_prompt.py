@@ -32,7 +32,7 @@ PATH_WORDS: dict[ChoiceOf, str] = {
     "model": "Open a depth model: an ONNX file, or a folder",
     "model folder": "Open the folder of a depth model",
 }
-NOTHING = "Nothing here can be opened: go to another folder."
+NOTHING, NO_SUCH_NAME = "Nothing here can be opened.", "No name here begins like that."
 
 
 def browsed_paths(state: AppState) -> tuple[str, ...]:
@@ -79,8 +79,6 @@ def _cells(prompt: PathPrompt, state: AppState, thumbnails: Mapping[str, Thumbna
     pitch = height + line + 2 * space
     imgui.begin_child("entries", imgui.ImVec2(0, SHOWN_ROWS * pitch), 0, imgui.WindowFlags_.no_nav)
     start, top = imgui.get_cursor_screen_pos(), int(imgui.get_scroll_y() / pitch)
-    if not names:
-        quiet(NOTHING)
     for i, name in enumerate(names):
         row, column = divmod(i, IN_ROW)
         if not top <= row <= top + SHOWN_ROWS:
@@ -93,7 +91,8 @@ def _cells(prompt: PathPrompt, state: AppState, thumbnails: Mapping[str, Thumbna
         is_folder = name.endswith((os.sep, browsing.UP))
         imgui.text(f"{icons.ICON_FA_FOLDER}  {name}" if is_folder else name)
         imgui.pop_clip_rect()
-    imgui.set_cursor_screen_pos(imgui.ImVec2(start.x, start.y))
-    imgui.dummy(imgui.ImVec2(1, -(-len(names) // IN_ROW) * pitch))
+    imgui.set_cursor_screen_pos(imgui.ImVec2(start.x, start.y + -(-len(names) // IN_ROW) * pitch))
+    if not set(names) - {browsing.UP}:
+        quiet(NOTHING if prompt.path == prompt.folder else NO_SUCH_NAME)
     imgui.end_child()
     return chosen, top
