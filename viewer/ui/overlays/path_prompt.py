@@ -92,6 +92,7 @@ def _cells(prompt: PathPrompt, state: AppState, thumbnails: Mapping[str, Thumbna
         imgui.text(f"{icons.ICON_FA_FOLDER}  {name}" if is_folder else name)
         imgui.pop_clip_rect()
     imgui.set_cursor_screen_pos(imgui.ImVec2(start.x, start.y + -(-len(names) // IN_ROW) * pitch))
+    imgui.dummy(imgui.ImVec2(0, 0))
     if not set(names) - {browsing.UP}:
         quiet(NOTHING if prompt.path == prompt.folder else NO_SUCH_NAME)
     imgui.end_child()
