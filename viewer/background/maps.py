@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 RANGE_PERCENTILES = 5.0, 95.0
 """Percentiles of the disparity of a surface that count as its far and near end."""
-OUTLINE_PX = 2
-"""Width of the outline of a selected surface, in pixels of the photo."""
+OUTLINE_SHARE = 1 / 800
+"""Width of the outline of a selected surface, as a share of the photo's width."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,9 @@ class SurfaceWork:
 
 
 def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the pixels of a mask (H, W) that are up to OUTLINE_PX from those outside it; the border has no outline."""
+    """Return the pixels of a mask (H, W) beside those outside it; the border has no outline."""
     inside = mask.copy()
-    for _ in range(OUTLINE_PX):
+    for _ in range(max(round(OUTLINE_SHARE * mask.shape[1]), 1)):
         around = np.pad(inside, 1, mode="edge")
         inside = inside & around[2:, 1:-1] & around[:-2, 1:-1] & around[1:-1, 2:] & around[1:-1, :-2]
     return mask & ~inside
