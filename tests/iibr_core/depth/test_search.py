@@ -60,6 +60,10 @@ def test_the_order_file_embedded_rough(tmp_path) -> None:
     found = open_with_depth(path, start_from("flat"))
     assert found.origin.kind == "flat"
     assert not found.disparity.values.any()
+    (tmp_path / "scene_disparity.npy").unlink()
+    for kind in ("photometric", "geometric"):
+        (tmp_path / f"scene.jpg.{kind}.bin").write_bytes(b"72&48&1&" + DEPTH.astype("<f4").tobytes())
+    assert open_with_depth(path, start_from("auto")).origin.words == "scene.jpg.geometric.bin", "COLMAP's better one"
 
 
 MAPS = {

@@ -6,6 +6,7 @@ from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.lens_limits import (
+    WIDEST_DISC,
     aperture_limit,
     clamp_optics,
     clamp_to_grid,
@@ -73,6 +74,9 @@ def test_every_number_of_the_lens_stays_within_its_limits(sign) -> None:
 
 
 def test_the_viewpoint_leaves_a_single_view_only() -> None:
+    shallow, deep = (replace(SCENE, disparity_range_px=(-1.0, far)) for far in (-0.8, 1e3))
+    assert aperture_limit(shallow) * 0.1 == pytest.approx(WIDEST_DISC * SCENE.width), "half of the range of disparity"
+    assert aperture_limit(deep) == 9, "as wide as the grid"
     assert [eye_limits(views) for views in (1, 2, 3, 4)] == [(-0.5, 0.5), (-1, 0), (-1, 1), (-2, 1)]
     single = replace(SCENE, grid=GridShape(1, 1))
     assert clamp_optics(Optics(ViewOffset(1.0, -1.0), aperture_diameter=3.0), single).eye == (0.5, -0.5)
