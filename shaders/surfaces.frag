@@ -20,6 +20,7 @@ layout(location = 1) out vec4 disc;
 
 const float NOWHERE = 4e6;         // diameter where there is no surface, as in slices.glsl: no slice has it
 const float MIN_STEP_PX = 1.0;     // least difference of discs at a depth edge
+const float MIN_LEVELS = 2.5;      // the same where a disparity has 8 bits, in its levels
 const float SLOPE_SHARE = 0.25;    // as in iibr_core/surfaces.py
 const float OUTLINE_SHARE = 0.08;  // as in iibr_core/method/mixed_pixels.py
 const float OUTLINE_TRUST = 0.02;  // weight of the outline against colours, squared linear light
@@ -47,6 +48,9 @@ struct Mixed {
 Mixed mixed_at(ivec2 at) {
     float here = seen_at(at), near = here, far = here, step_px = max(texel_px, 1.0);
     float edge = MIN_STEP_PX / max(disc_px, 1e-9), beside = 0.0;
+#ifdef DISPARITY_IN_ALPHA
+    edge = max(edge, MIN_LEVELS / 255.0 * (nearest - farthest));
+#endif
     vec2 towards = vec2(0.0);
     for (int i = 0; i < 9; i++) {
         vec2 to = vec2(i % 3, i / 3) - 1.0;
