@@ -20,7 +20,13 @@ from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
 
-SETTINGS = ((0.0, 0.0, 0.0, 0.0), (0.5, -0.25, 0.0, 0.0), (-0.5, 0.25, 0.4, 1.2), (0.5, 0.5, -0.2, 3.0))
+SETTINGS = (
+    (0.0, 0.0, 0.0, 0.0),
+    (0.5, -0.25, 0.0, 0.0),
+    (-0.5, 0.25, 0.4, 1.2),
+    (0.5, 0.5, -0.2, 3.0),
+    (0.0, 0.0, 3.0, 9.0),
+)
 """s, t, focus, aperture."""
 MIN_PSNR_OF_HALVES_DB = 55.0
 """Agreement of sums in half floats with those in floats: 61.8 dB were measured at least."""

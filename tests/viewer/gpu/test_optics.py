@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.beyond.hidden_surfaces import HiddenSurface
 from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.color import linear_from_srgb
 from iibr_core.exports.render_settings import RenderSettings
@@ -81,6 +82,25 @@ def test_highlights_count_for_more(renderer):
     assert light[3, 3] == pytest.approx(dark, rel=0.05), "what is not clipped stays"
     counted = (light - light[3, 3]).sum() / side_px**2
     assert counted == pytest.approx(1 + HIGHLIGHT_GAIN * recovery - dark, rel=0.2)
+
+
+def test_highlights_behind_an_edge_count_for_more_too(renderer):
+    """A dark disc before a white wall: past its edge, an open lens sees wall that the eye does not."""
+    size, optics = (96, 64), Optics(focus_disparity=1.0, aperture_diameter=4.0)
+    y, x = np.indices(size[::-1])
+    disparity = np.where(np.hypot(y - 32, x - 48) < 14, 6.0, 1.0).astype(np.float32)
+    colors = np.where(disparity[..., None] > 2, 60, 255).astype(np.uint8).repeat(3, -1)
+    renderer.open_field(GridShape(1, 1), *size, hdr=False, with_disparity=True)
+    renderer.upload_view(0, 0, colors, disparity)
+    renderer.set_hidden(HiddenSurface(np.ones((*size[::-1], 3), np.float32), np.ones_like(disparity), disparity > 0))
+    plain, bright = (
+        renderer.converged_picture(RenderSettings(replace(optics, highlight_recovery=share), size, is_linear=True))
+        for share in (0.0, 1.0)
+    )
+    inside = np.hypot(y - 32, x - 48) < 11
+    wall_share = (plain[inside] - plain[32, 48]).mean()
+    assert wall_share > 0.05
+    assert (bright[inside] - bright[32, 48]).mean() == pytest.approx((1 + HIGHLIGHT_GAIN) * wall_share, rel=0.1)
 
 
 def test_saturated_colours_are_no_highlights(renderer):

@@ -141,7 +141,7 @@ class Discs:
         for i, switch in enumerate(SURFACES):
             if switch == "BEHIND" and hidden is None:
                 continue
-            program = self._programs.get("surfaces.frag", {switch: True} if switch else {})
+            program = self._programs.get("surfaces.frag", {switch: bool(switch), "HIGHLIGHTS": lens.highlight_gain > 0})
             framebuffer.viewport = 0, i * height, width, height
             framebuffer.use()
             program.set_uniforms(
@@ -151,6 +151,7 @@ class Discs:
                 part=part,
                 disc_px=lens.disc_px,
                 texel_px=lens.texel_px,
+                highlight_gain=lens.highlight_gain,
                 focus_disparity=lens.optics.focus_disparity,
                 focus_tilt=lens.optics.focus_tilt,
                 focus_range=max(lens.optics.focus_range, 0.0),
