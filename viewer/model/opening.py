@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import PurePath
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.formats.images.picture import CUT_OFF
 from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source, source_with_depth
 from iibr_core.types import InputError
@@ -298,9 +299,12 @@ def _first_progress(state: AppState, scene: Scene) -> Progress:
 
 
 def _problems(scene: Scene) -> tuple[Notice, ...]:
-    """Return a notice for each source of depth that failed, with buttons that give better depth if it is poor."""
+    """Return a notice for each source of depth that failed, with buttons that give better depth if it is poor, and one
+    for a file that is cut off.
+    """
     is_poor = scene.depth_origin is not None and scene.depth_origin.is_poor
-    return tuple(Notice(problem, commands=DEPTH_COMMANDS if is_poor else ()) for problem in scene.problems)
+    failed = (Notice(problem, commands=DEPTH_COMMANDS if is_poor else ()) for problem in scene.problems)
+    return (*(Notice(note) for note in scene.notes if note == CUT_OFF), *failed)
 
 
 def _offers(scene: Scene) -> tuple[Notice, ...]:

@@ -18,7 +18,7 @@ from iibr_core.formats.images.color_profile import color_profile_of, color_space
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.open_picture import open_picture
-from iibr_core.formats.images.picture import Picture, full_scale, upright
+from iibr_core.formats.images.picture import CUT_OFF, Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, small_picture, source_size
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.images.tiles import tile_note
@@ -31,8 +31,6 @@ DEFAULT_FOV_DEG = 50.0
 MAX_BAND_ROWS = 32
 MAX_BAND_PIXELS = 1 << 20
 """Largest number of stored pixels that are averaged at a time: as floats they take 12 bytes each, or more."""
-
-CUT_OFF = "The file is cut off: what is missing is grey. Get the whole file again."
 
 
 def read_photo(

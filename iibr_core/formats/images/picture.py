@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import MAX_FILE_PIXELS, refuse_bomb
 from iibr_core.types import ImageSize, InputError, image_size
 
+CUT_OFF = "The file is cut off: what is missing is grey. Get the whole file again."
+"""Note of a picture that was read as far as it goes."""
 EXIF_NUMBERS = {
     0x920A: "FocalLength",
     0xA405: "FocalLengthIn35mmFilm",

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthOrigin
+from iibr_core.formats.images.picture import CUT_OFF
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, Source
@@ -151,12 +152,12 @@ def test_a_new_scene_starts_with_fresh_optics_and_names_only_what_failed():
     state = reduce(
         reduce(state_with(scene_of()), do(lens.set_aperture, 2)), do(opening.open_source, Source("other.png"))
     )
-    notes = ("Made smaller.", "A map is damaged.")
+    notes = ("Made smaller.", CUT_OFF, "A map is damaged.")
     origin = DepthOrigin("rough", "rough, guessed without a model")
-    scene = scene_of(source=state.source, notes=notes, problems=notes[1:], depth_origin=origin)
+    scene = scene_of(source=state.source, notes=notes, problems=notes[2:], depth_origin=origin)
     state = reduce(state, do(opening.show_scene, state.generation, scene))
     assert state.optics == Optics()
-    assert state.notices == (Notice("A map is damaged.", commands=DEPTH_COMMANDS),)
+    assert state.notices == (Notice(CUT_OFF), Notice("A map is damaged.", commands=DEPTH_COMMANDS))
 
 
 @pytest.mark.parametrize(
