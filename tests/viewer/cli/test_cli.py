@@ -246,7 +246,9 @@ def test_options_of_the_lens_that_would_change_nothing_are_said(iibr, photo_path
 def test_plan_names_size_depth_and_reasons(iibr, photo_path):
     first, *reasons = output_of(iibr("plan", photo_path)).splitlines()
     assert first == "scene: 96x64 px, disparity from scene_disparity.npy"
-    assert reasons
+    deeper = output_of(iibr("plan", photo_path, "--depth-strength", 2))
+    for words, moves in ((" ".join(reasons), 4), (deeper, 8)):
+        assert f"The nearest moves {moves} px against the farthest" in words
 
 
 @pytest.mark.parametrize(

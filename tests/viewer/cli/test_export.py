@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.maps.pfm import read_pfm
-from iibr_core.types import DISPLAY_P3, SRGB
+from iibr_core.types import DISPLAY_P3, SRGB, TOTAL_PARALLAX
 from tests.viewer.cli.conftest import output_of, refusal_of
+from tests.viewer.conftest import WIDTH
 
 GLOSS = "roughness = 0.5\nreflectance = 0.5\n[light]\ndirection = [0, 0, -1]\n"
 
@@ -35,6 +36,13 @@ def test_a_drawn_kind(iibr, photo):
     assert "animations of 100 frames a second; the same 0.06 s have 3 frames instead" in done.stderr
     with Image.open("a.gif") as image:
         assert (image.size, image.n_frames) == ((30, 20), 3)
+    Path("keys.txt").write_text("1 0\n1 0\n")
+    output_of(iibr("export", photo, "--to", "gif", "-o", "still.gif", "--grid", 3, "--frames", 4, "--path", "keys.txt"))
+    with Image.open("still.gif") as image:
+        frames = [np.asarray(frame.convert("RGB")).astype(int) for frame in ImageSequence.Iterator(image)]
+    assert all(np.array_equal(frame, frames[0]) for frame in frames), "the camera stands still"
+    red = np.nonzero(frames[0][..., 0] > frames[0][..., 1] + 60)[1].mean()
+    assert red < WIDTH / 2 - 1, "to the right of the middle"
 
 
 def test_the_lens_of_a_drawn_kind_has_the_options_of_a_screenshot(iibr, photo):
@@ -108,6 +116,10 @@ def test_a_light_field_of_disparity_as_given(iibr, photo):
     assert output_of(done) == "field\n"
     assert "In the window it is 4%" in done.stderr
     assert len(views_of("field")) == 25
+    output_of(iibr("export", photo, "--to", "hci", "--grid", 5, "--depth-strength", 0.5, "-o", "flat"))
+    assert 4 * np.ptp(read_pfm(Path("flat/gt_disp_lowres.pfm"))) == pytest.approx(
+        0.5 * TOTAL_PARALLAX * WIDTH, rel=0.01
+    )
     output_of(iibr("export", "field", "--to", "eslf", "-o", "a_eslf.png"))
     with Image.open("a_eslf.png") as image:
         assert image.size == (5 * 96, 5 * 64)

@@ -215,7 +215,11 @@ def test_a_zoomed_picture_has_its_own_values_strips_and_a_frame_on_the_minimap(v
     row = round((26.5 / HEIGHT - seen.y) / seen.height * picture.shape[0])
     near = np.abs(strip[strip.shape[0] // 3 + 3] - picture[row]).max(axis=1)
     assert np.median(near) <= 6, "the strip shows the seen part"
-    viewer.do(do(lens.set_exposure, -2.0), do(inspection.set_hover, None))
+    viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
+    near = part(viewer.screen(size), layout.frame)[row, :, 0] > 128  # viridis: only its light end is red
+    right = (2 / 3 - seen.x) / seen.width
+    assert np.flatnonzero(near).max() / near.size == pytest.approx(right, abs=0.02), "the square's right border"
+    viewer.do(do(inspection.set_overlay, None), do(lens.set_exposure, -2.0), do(inspection.set_hover, None))
     dark = viewer.screen(size)
     for rect in (layout.minimap, layout.strip_across, layout.strip_down):
         assert np.median(part(dark, rect)) < 0.7 * np.median(part(screen, rect)), "as dark as the picture"
