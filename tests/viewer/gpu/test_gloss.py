@@ -16,6 +16,8 @@ GRID = GridShape(3, 3)
 WIDTH, HEIGHT = 96, 72
 LIT = Gloss(roughness=0.4, reflectance=0.3, light=GlossLight((0.1, -0.1, -1), (0.5, 0.4, 0.3)))
 METAL = Gloss(GlossSurface(), 0.2, 0.6, GlossLight((0.3, -0.2, -1)))
+SHARE = Gloss(GlossSurface(color=(0.55, 0.55, 0.55)), 0.2, 0.6, GlossLight((0.3, -0.2, -1)))
+"""Only about half of what the photo's grey reflects, as its colour is at the edge of the tolerance."""
 
 
 def bump():
@@ -44,7 +46,7 @@ def shaded(gloss, maps, photo, eye):
 
 
 @pytest.mark.parametrize("infinity", [-1.0, 1.6], ids=["all nearer than infinity", "some beyond infinity"])
-@pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
+@pytest.mark.parametrize("gloss", [LIT, METAL, SHARE], ids=["lit", "metal", "half of it"])
 def test_the_photo_with_gloss_is_the_cores(renderer, gloss, infinity):
     photo, disparity = np.full((HEIGHT, WIDTH, 3), 100, np.uint8), bump()
     maps = maps_of(gloss, photo, disparity, infinity)
