@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE
+from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
+from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import headless_with_scene, write_scene
@@ -152,3 +154,25 @@ def test_the_picture_of_a_photo_stays_until_that_of_its_next_scene_is_fine(opene
     shown = list(frames_of(view, opened.state, 40))
     assert np.array_equal(shown[0], before)
     assert {int(frame.min()) for frame in shown} == {int(before.min()), 255}, "no draft between"
+
+
+def test_gloss_other_cameras_and_previews_are_seen_when_they_come(opened):
+    view, gloss = opened.view, Gloss(roughness=0.5, reflectance=0.5)
+    white = replace(view.centre, colors=np.full_like(view.centre.colors, 255))
+    opened.do(do(lens.set_gloss, gloss), do(lens.move_eye, ViewOffset(0.0, 1.0)))
+    images = []
+    for change in (
+        lambda: None,
+        lambda: view.take_gloss(make_maps(view.gloss_request(gloss))),
+        lambda: view.show_fallback(white),
+        lambda: view.show_fallback(None),
+        lambda: view.show_disparity(np.zeros_like(view.centre.disparity)),
+    ):
+        change()
+        view.converge(opened.state, SIZE)
+        images.append(view.renderer.read_image().astype(int))
+    matt, glossy, fallback, again, flat = images
+    assert glossy.mean() > matt.mean() + 1
+    assert fallback.mean() > 250
+    assert np.abs(again - glossy).max() <= 1
+    assert np.abs(flat - again).mean() > 1
