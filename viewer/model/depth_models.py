@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.scenes.scene import Scene, source_with_depth
+from iibr_core.scenes.scene import Scene, Source, source_with_depth
 from viewer.model.action import Setter, setter
 from viewer.model.messages import notify
 from viewer.model.remedies import DEPTH_COMMANDS
@@ -12,6 +12,14 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import DepthModels, Downloading, ModelOffer, ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.tasks import PlainTask
+
+
+def keep_choice(state: AppState, source: Source) -> AppState:
+    """Return the state in which a chosen model serves further photos, where another photo is opened while it works."""
+    asked = state.models.asked
+    if asked is None or state.source is None or state.source.path == source.path or _is_elsewhere(asked, state.models):
+        return state
+    return replace(state, preferences=replace(state.preferences, depth_model=asked, guesses_depth=False))
 
 
 def wanted_model(state: AppState) -> str | None:

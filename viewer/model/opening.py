@@ -19,7 +19,7 @@ from iibr_core.types import InputError
 from viewer.model.action import Setter, setter
 from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, with_focus_of
 from viewer.model.demo_photo import is_ours
-from viewer.model.depth_models import offered_model
+from viewer.model.depth_models import keep_choice, offered_model
 from viewer.model.focal_plane import focus_on
 from viewer.model.history import map_optics, undoable
 from viewer.model.messages import MAX_NOTICES, notify
@@ -39,7 +39,7 @@ def open_source(state: AppState, source: Source) -> AppState:
     """Open a photo or a light field in place of the open scene, which stays until the new one is read."""
     offered_for = state.models.offered_for if offered_model(state) is None else ""
     return replace(
-        state,
+        keep_choice(state, source),
         source=source,
         progress=Progress(doing=f"reading {PurePath(source.path).name}"),
         generation=state.generation + 1,

@@ -42,3 +42,5 @@ def test_an_estimate_that_comes_after_the_next_photo_was_asked_for_is_not_shown_
         assert reduce(asked, late) is asked
         _, next_photo = opened(asked, second)
         assert finder.newest(next_photo) is next_photo
+        same = reduce(wanted, do(opening.open_source, Source(first.path)))
+        assert (asked.preferences.depth_model, same.preferences.depth_model) == (model, ""), "chosen for further photos"
