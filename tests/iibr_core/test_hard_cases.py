@@ -3,9 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.search import find_depth
-from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.patch_synthesis import MAX_TEXTURE
@@ -14,7 +11,7 @@ from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.plan import plan_for_viewing, plan_literal
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.scenes import by_index, disparity_of, photo_of, smooth_texture, square_before_wall
 
 HEIGHT, WIDTH = 20, 26
@@ -55,20 +52,6 @@ def test_disparity_all_equal():
     assert not plan.has_disocclusion
 
 
-@pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])
-def test_unknown_disparity_of_a_file_is_filled_from_behind_with_a_note(tmp_path, unknown):
-    photo, disparity = square_before_wall(HEIGHT, WIDTH)
-    for hole in (np.s_[5:12, 10:14], np.s_[:4], np.s_[:, -4:]):
-        holed = disparity.values.copy()
-        holed[hole] = unknown
-        np.save(tmp_path / "map.npy", holed)
-        read = read_disparity(tmp_path / "map.npy", photo.size)
-        known = np.isfinite(holed)
-        assert (read.values[known] == holed[known]).all()
-        assert any("unknown" in note for note in read.notes)
-        field_of(photo, read)
-
-
 def test_disparity_with_one_outlier_at_1e6(tmp_path):
     photo, values = plain_photo(), np.zeros((HEIGHT, WIDTH), np.float32)
     values[8, 9] = 1e6
@@ -89,20 +72,6 @@ def test_disparity_larger_than_the_image():
     views = field_of(plain_photo(), disparity_of(np.full((HEIGHT, WIDTH), 500.0)))
     del views[GRID.centre]
     assert all(view.inpainted.all() and (view.colors == 0).all() for view in views.values())
-
-
-def test_depth_of_0(tmp_path):
-    depth = np.full((HEIGHT, WIDTH), 4.0, np.float32)
-    depth[:, :9], depth[6:9, 6:9] = 1.0, 0.0
-    write_image(tmp_path / "photo.png", plain_photo().pixels)
-    np.save(tmp_path / "a_depth.npy", depth)
-    choice = DepthChoice(file=str(tmp_path / "a_depth.npy"), refine=False)
-    read = find_depth(tmp_path / "photo.png", plain_photo(), choice).disparity
-    assert (read.values[:, :6] > read.values[:, 12:].max()).all()
-    field_of(plain_photo(), read)
-    np.save(tmp_path / "a_depth.npy", depth * 0)
-    with pytest.raises(InputError, match=r"no known value"):
-        find_depth(tmp_path / "photo.png", plain_photo(), choice)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 13), (11, 1), (2, 2), (7, 13)])

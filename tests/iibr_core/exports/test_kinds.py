@@ -26,12 +26,6 @@ def test_defaults(kind, size, frames, rate) -> None:
     assert (options.size, options.frames, options.rate, options.eyes, options.row) == (size, frames, rate, 3, 250)
 
 
-@pytest.mark.parametrize(("kind", "rate", "count"), [("gif", 100.0, 200), ("webp", 60.0, 200), ("mp4", 60.0, 240)])
-def test_animated_pictures_have_at_most_fifty_frames_a_second(kind, rate, count) -> None:
-    options = with_defaults(EXPORTS[kind], ExportOptions(rate=rate), SCENE, SHARP_NEAR)
-    assert (options.frames, options.rate) == (count, min(rate, EXPORTS[kind].max_rate or rate))
-
-
 @pytest.mark.parametrize(("height", "width"), [(3000, 4000), (4000, 3000), (9000, 1000), (1000, 9000), (2160, 3840)])
 def test_a_large_video_is_one_that_phones_play(height, width) -> None:
     scene = replace(SCENE, width=width, height=height)

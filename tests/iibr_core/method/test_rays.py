@@ -4,7 +4,7 @@ import pytest
 from iibr_core.method.rays import CELL_PX, GUARD_BAND_PX, RaysBehind, RaySet, rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
-from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, SMOOTH_SHARE
+from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import ImageSize, Margins, ViewOffset
 from tests.iibr_core.method.ray_sets import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
@@ -54,12 +54,6 @@ def test_edges_and_cells(size, unknown):
     assert (rays.cells.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
     assert (rays.cells.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
     assert rays.cells.step == pytest.approx(slow_steps(disparity))
-
-
-def test_in_nearer_views_larger_steps_are_smooth():
-    rays = RaySet(0, ImageSize(8, 8), farthest_views=4.0)
-    assert rays.smooth_step(ViewOffset(-4.0, 1.0)) == pytest.approx(SMOOTH_SHARE * SAME_SURFACE_PX / 4)
-    assert rays.smooth_step(ViewOffset(1.0, 0.0)) == pytest.approx(SMOOTH_SHARE * SAME_SURFACE_PX)
 
 
 @pytest.mark.parametrize("margins", [Margins(), Margins(3, 2, 0, 4)])
