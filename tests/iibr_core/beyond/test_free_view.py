@@ -139,6 +139,7 @@ def test_rays_reach_as_far_as_cameras_stand_beside_or_turn():
     assert max(at.s for at in reach.outer) == pytest.approx(free_cameras.FARTHEST_STEPS)
     margins = free_cameras.reach_of(photo, [camera(40, 48, turned=about(1, 10.0))], (1.0, 3.0)).margins
     assert margins.right >= 60 * np.tan(np.radians(10.0)) > 0 == margins.left
+    assert margins.top == margins.bottom < 10
     wide = free_cameras.reach_of(photo, [camera(40, 48, 2.0)], (1.0, 3.0)).margins
     assert tuple(wide) == (free_cameras.MAX_BEYOND * 40,) * 2 + (free_cameras.MAX_BEYOND * 48,) * 2
 

@@ -122,6 +122,13 @@ def test_a_sky_at_infinity_is_far_but_not_infinitely(source, farthest) -> None:
     assert cameras_of(with_metres(source, 2.0, farthest)).depth_range == pytest.approx((1, 1000), rel=1e-3)
 
 
+def test_a_plan_with_another_disparity_that_stays_states_its_range(source) -> None:
+    plan = source.plan(0.75)
+    field = plan.field_disparity(source.loaded.disparity).values
+    assert (field.min(), field.max()) == pytest.approx(plan.disparity_range_px)
+    assert field[32, 48] == pytest.approx((source.loaded.disparity.values[32, 48] - 0.75) * plan.disparity_scale)
+
+
 def test_maps(source, tmp_path) -> None:
     disparity = read_pfm(exported(source, "disparity", tmp_path / "a.pfm"))
     out = exported(source, "depth", tmp_path / "a.exr")

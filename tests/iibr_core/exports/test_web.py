@@ -84,10 +84,14 @@ def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
         assert budget is None or len(page) <= budget
         forms.append((-views.form.scale, views.form.every, -views.form.quality))
         parallax.append(np.array(views.range_px) / views.size.width)
-        budget = len(page) - 1
+        budget = len(page) - 1 if len(forms) < 3 else len(page) * 19 // 20
     assert forms[:3] == [(-1.0, 1, -82), (-1.0, 1, -65), (-1.0, 1, -48)]
     assert forms == sorted(forms)
     np.testing.assert_allclose(parallax, parallax[:1] * len(parallax), err_msg="as much parallax at half the size")
+    field = json.loads(page.decode().partition('id="field">')[2].partition("</script>")[0])
+    assert field["focusLimits"] == pytest.approx(
+        [views.size.width / 96 * limit for limit in focus_limits(opened.scene)]
+    )
     with pytest.raises(InputError, match="budget"):
         page_of(opened, budget=10_000)
 
