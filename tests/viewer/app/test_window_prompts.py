@@ -83,6 +83,20 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer):
     assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
 
 
+def test_another_purpose_of_an_export_shows_its_rows_at_once(viewer):
+    viewer.do(do(saving.ask_to_export))
+    viewer.until_idle()
+    window = imgui.internal.find_window_by_name("prompt ExportPrompt")
+    heights = [window.size.y]
+    viewer.find("3D displays", "prompt ExportPrompt")
+    viewer.send("click", 1)
+    viewer.until(lambda app: heights.append(window.size.y) or app.state.prompt.kind == "quilt")
+    for _ in range(5):
+        viewer.app.step()
+        heights.append(window.size.y)
+    assert min(heights) >= min(heights[0], heights[-1]), "no frame without rows"
+
+
 def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer):
     viewer.do(do(saving.ask_to_export))
     viewer.press("##kind", "prompt ExportPrompt")

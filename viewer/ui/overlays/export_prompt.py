@@ -73,8 +73,10 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     chosen = _kind_rows(prompt.kind)
     if chosen == PICTURE:
         return [do(saving.ask_to_save)]
-    if chosen != prompt.kind:
-        return [do(messages.show_prompt, saving.as_other_kind(state, prompt, chosen))]
+    actions: list[Action] = []
+    if chosen != prompt.kind:  # its rows are drawn at once: a frame without them would flicker
+        prompt = saving.as_other_kind(state, prompt, chosen)
+        actions = [do(messages.show_prompt, prompt)]
     kind, scene = EXPORTS[chosen], state.scene
     is_advanced = is_seen_open("advanced", state.preferences.open_sections)
     edited = replace(
@@ -87,7 +89,7 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     written = _written_name(kind, edited, scene)
     if written and written != Path(prompt.path.strip()).name:
         quiet(f"The file name becomes {written}{', for programs that read it.' if kind.path else '.'}")
-    return place_actions(prompt, edited, row_of_path, ExportTask, "Export", state, written)
+    return actions + place_actions(prompt, edited, row_of_path, ExportTask, "Export", state, written)
 
 
 def _kind_rows(kind: str) -> str:
