@@ -106,17 +106,11 @@ def test_a_pair_side_by_side_tells_the_disparity_from_eye_to_eye(tmp_path) -> No
     assert found[1] == "side-by-side stereo"
     assert found[0].values.shape == (60, 80)
     assert np.median(np.abs(found[0].values - DISPARITY)) < 0.25  # a smooth wall, half a pixel a step
-
-
-def test_files_without_a_pair_or_that_show_another_picture_tell_nothing(tmp_path) -> None:
-    Image.fromarray(eye(0)).save(tmp_path / "a.png")
-    assert estimate_from_pair(tmp_path / "a.png") is None
-    (tmp_path / "a.lif").write_bytes(leia_image(eye(0), eye(1)).replace(b'"blob_id": -1', b'"blob_id": 10'))
-    assert estimate_from_pair(tmp_path / "a.lif") is None
-
-
-def test_views_of_two_shapes_are_refused(tmp_path) -> None:
-    narrow = Image.fromarray(eye(1)[:, :50])
-    Image.fromarray(eye(0)).save(tmp_path / "a.mpo", "MPO", save_all=True, append_images=[narrow])
+    Image.fromarray(eye(0)).save(path.with_name("a.png"))
+    path.with_name("a.lif").write_bytes(leia_image(eye(0), eye(1)).replace(b'"blob_id": -1', b'"blob_id": 10'))
+    for other in ("a.png", "a.lif"):
+        assert estimate_from_pair(path.with_name(other)) is None, "no pair, or another picture is shown"
+    narrow, mpo = Image.fromarray(eye(1)[:, :50]), path.with_name("a.mpo")
+    Image.fromarray(eye(0)).save(mpo, "MPO", save_all=True, append_images=[narrow])
     with pytest.raises(InputError, match=r"a\.mpo: .*80x60 and 50x60"):
-        estimate_from_pair(tmp_path / "a.mpo")
+        estimate_from_pair(mpo)

@@ -102,21 +102,22 @@ def require_whole() -> None:
     assert found == {name: data for name, data in PUBLISHED.items() if name != "README.md"}
 
 
-def test_a_stopped_download_is_resumed(hub) -> None:
+@pytest.mark.parametrize("is_cut", [False, True], ids=["stopped", "cut off"])
+def test_a_download_is_resumed(hub, is_cut) -> None:
+    hub.is_cut = is_cut
+    if not is_cut:
+        stop_half_way(hub)
+    require_whole()
+    assert hub.begins == [0, PIECE]
+
+
+def stop_half_way(hub) -> None:
     hub.may_finish.clear()
     part = local_folder(MODEL) / f"{WEIGHTS}.part"
     with pytest.raises(Cancelled), stoppable(lambda: part.is_file() and part.stat().st_size >= PIECE):
         catalog.fetch(MODEL)
     assert not part.with_name("model.onnx").exists()
     hub.may_finish.set()
-    require_whole()
-    assert hub.begins == [0, PIECE]
-
-
-def test_a_connection_that_breaks_is_resumed(hub) -> None:
-    hub.is_cut = True
-    require_whole()
-    assert hub.begins == [0, PIECE]
 
 
 def test_other_bytes_than_the_hub_states_are_refused(hub) -> None:
@@ -125,10 +126,8 @@ def test_other_bytes_than_the_hub_states_are_refused(hub) -> None:
         catalog.fetch(MODEL)
     assert not list(local_folder(MODEL).rglob("model.onnx*"))
     hub.files[WEIGHTS] = PUBLISHED[WEIGHTS]
-    require_whole()
-
-
-def test_a_hub_without_the_model_is_one_line(hub) -> None:
-    hub.commit = "f" * 40
+    commit, hub.commit = hub.commit, "f" * 40
     with pytest.raises(InputError, match=rf"^{MODEL.title} cannot be downloaded \(404[^\n]*$"):
         catalog.fetch(MODEL)
+    hub.commit = commit
+    require_whole()
