@@ -201,13 +201,10 @@ def test_stanford_viewpoints_are_the_cameras_positions(tmp_path, jitter) -> None
         np.testing.assert_allclose(offset, steps[at] - steps[0, 0], atol=2 * jitter + 1e-6)
     assert {view.path.stem[:9]: view.place for view in scene.views}["out_04_03"] == (0, 0)
     assert ("stand up to" in scene.notes[0]) == (jitter > 0)
-
-
-def test_a_renderer_writes_focal_length_and_sensor_after_the_position(tmp_path) -> None:
-    at = list(np.ndindex(3, 3))
-    write_flat(tmp_path, [f"Camera 1_{v:02d}_{u:02d}_{10.0 - 5 * v:f}_{5.0 * u:f}_30_36.png" for v, u in at])
-    scene = scene_of(tmp_path)
-    assert {view.path.stem[:14]: view.place for view in scene.views}["Camera 1_02_01"] == (0, 1)
+    at = list(np.ndindex(3, 3))  # a renderer writes focal length and sensor after the position
+    names = [f"Camera 1_{v:02d}_{u:02d}_{10.0 - 5 * v:f}_{5.0 * u:f}_30_36.png" for v, u in at]
+    rendered = scene_of(write_flat(tmp_path / "rendered", names))
+    assert {view.path.stem[:14]: view.place for view in rendered.views}["Camera 1_02_01"] == (0, 1)
 
 
 @pytest.mark.parametrize(("rows", "columns", "step"), [(3, 3, 20.0), (3, 1, 45.0), (1, 3, 20.0)])

@@ -251,17 +251,13 @@ def test_for_any_display_views_keep_their_shape_and_are_never_larger(view) -> No
         assert quilt.tile.width / quilt.tile.height == pytest.approx(quilt.aspect, rel=0.03)
 
 
-def test_views_are_laid_out_from_the_lower_left_and_the_remainder_stays_black() -> None:
+def test_views_are_laid_out_from_the_lower_left_and_a_name_states_the_quilt() -> None:
+    """The remainder stays black. A name gets one tag."""
     quilt = Quilt(3, 2, ImageSize(9, 13), 1.0)
     whole = lay_out(quilt, [np.full((4, 4, 3), 10 * (view + 1), np.uint8) for view in range(6)])
     assert (whole[8, 0, 0], whole[8, 11, 0], whole[1, 0, 0]) == (10, 30, 40)
     assert not whole[0].any()
     assert not whole[:, 12].any()
-    with pytest.raises(ValueError, match="zip"):
-        lay_out(quilt, [np.zeros((4, 4, 3), np.uint8)] * 5)
-
-
-def test_a_name_states_the_quilt_and_gets_one_tag() -> None:
     quilt = quilt_named(Path("a_qs8x6a0.75.png"), ImageSize(60, 80))
     assert quilt == Quilt(8, 6, ImageSize(60, 80), 0.75)
     assert tagged(tagged(Path("b/a.png"), quilt.tag), quilt.tag) == Path("b/a_qs8x6a0.75.png")
