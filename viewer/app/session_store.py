@@ -85,7 +85,7 @@ class SessionStore:
         self._save()
 
     def close(self) -> None:
-        """Wait for what is being written."""
+        """Wait until all sessions are written."""
         self._executor.shutdown()
 
     def _follow(self, settings: SavedSettings) -> None:

@@ -120,7 +120,7 @@ def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 class Finder(Generic[Request, Result]):
-    """Finds, in a thread, what the state wants; equal requests are made once."""
+    """Finds maps that the state asks for, in a thread; equal requests are made once."""
 
     def __init__(
         self,
@@ -129,13 +129,13 @@ class Finder(Generic[Request, Result]):
         take: Callable[[Result], Sequence[Action] | None],
         give_up: Action | None = None,
     ) -> None:
-        """request_for: returns the request for what is wanted. take: shows a result. give_up: follows a failure."""
+        """request_for: returns the request of a state. take: shows a result. give_up: follows a failure."""
         self._asked: Request | None = None
         self._newest, self._request_for, self._take, self._give_up = newest, request_for, take, give_up
         self.close = newest.close
 
     def advance(self, state: AppState) -> list[Action]:
-        """Show new results, report failures, and request what is missing."""
+        """Show new results, report failures, and begin the request of the state."""
         actions: list[Action] = []
         while (result := self._newest.next_result()) is not None:
             if isinstance(result, Failed):
