@@ -78,20 +78,21 @@ class App:
         except InputError:
             self.window.close()
             raise
+        wake = self.window.wake
         self.scene_view = SceneView(self._gl)
         self.stereo_screen = StereoScreen(self._gl, self.scene_view, self.window)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
-        self.sharpener = Sharpener(self._gl, self.scene_view, self.window.wake)
-        self.free_camera_view = FreeCameraView(self.scene_view, self.window.wake)
-        view, wake = self.inspection_view, self.window.wake
-        self._tracker = Tracker(self.window.wake)
-        self.receiver = Receiver(self.window.wake)
+        self.sharpener = Sharpener(self._gl, self.scene_view, wake)
+        self.free_camera_view = FreeCameraView(self.scene_view, wake)
+        self._tracker = Tracker(wake)
+        self.receiver = Receiver(wake)
         self._ui = UiHost(self.look(), self.window.handle)
-        self._filmstrip = FilmstripView(self._gl, self.window.wake)
-        self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, self.window.wake)
-        self._side_effects = SideEffects(self.scene_view, self.window.wake, self.window.clipboard_text)
-        self._sessions = SessionStore(kept_in, self.window.wake)
+        self._filmstrip = FilmstripView(self._gl, wake)
+        self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, wake)
+        self._side_effects = SideEffects(self.scene_view, wake, self.window.clipboard_text)
+        self._sessions = SessionStore(kept_in, wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
+        view = self.inspection_view
         entropy, no_overlay = Newest("iibr-entropy", EntropyWork(), wake), do(inspection.set_overlay, None)
         surface, no_surface = Newest("iibr-surface", SurfaceWork(), wake), do(selection.deselect)
         gloss = Newest("iibr-gloss", find_gloss, wake)
