@@ -88,6 +88,7 @@ export class Discs {
     drawTile(start, end, into) {
         const { renderer, picture: { lens } } = this, { gl } = renderer, { places, sizes } = this.placesOf(start, end);
         const [sheet, blurred] = ["slices", "blurred"].map((name, i) => renderer.sheet(name, gl.RGBA16F, ...sizes[i]));
+        [sheet, blurred].forEach((each, i) => renderer.clear(each, sizes[i]));
         this.drawSlices(places, sheet);
         this.blurSlices(places, blurred);
         const table = Array(4 * NUMBERS.MAX_SLICES).fill(0);
@@ -123,7 +124,6 @@ export class Discs {
     pointBlocks = (texel) => Math.max(Math.floor(ALIGNED_PX * texel / this.blockPx), 1);
 
     drawSlices(places, sheet) {
-        this.renderer.clear(sheet);
         for (const { index, texel, origin, source, size } of places) {
             const values = { ...this.area(), tent: this.tents[index], origin, corner: source, texel };
             const box = { corner: source, size, origin, texel }, { occupancy } = this.renderer.sheets;
@@ -134,7 +134,6 @@ export class Discs {
     blurSlices(places, blurred) {
         const { renderer, picture: { lens } } = this, { gl, sheets } = renderer, bytes = 16 * NUMBERS.MAX_TAPS;
         const program = ["disc.frag", lens.shape.kind === "cat_eye" && "CAT_EYE"];
-        renderer.clear(blurred);
         for (const place of places) {
             const { index, taps, source, target, pad, blurredSize: size, first: origin, texel } = place;
             gl.bindBufferRange(gl.UNIFORM_BUFFER, 0, this.taps, index * bytes, bytes);

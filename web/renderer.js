@@ -79,10 +79,14 @@ export class Renderer {
         return (sheets[name] = { ...sheet, framebuffer });
     }
 
-    clear({ framebuffer }) {
+    // Clears a sheet, or the lower left part of this size.
+    clear({ framebuffer, width, height }, size = [width, height]) {
         const { gl } = this;
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+        gl.enable(gl.SCISSOR_TEST);
+        gl.scissor(0, 0, ...size);
         gl.clear(gl.COLOR_BUFFER_BIT);
+        gl.disable(gl.SCISSOR_TEST);
     }
 
     // Stores a view, or the hidden surface after the last one. rgba: bytes, sRGB-encoded; alpha is the disparity in the
