@@ -26,6 +26,8 @@ SCROLL_DOWN = 5
 """The button that the X server takes for a turn of the wheel."""
 FRAME_CORNERS = 8
 """Of those that ImGui draws a frame with, inside and outside: more than that may be a line to the pointer."""
+BORDER_PX = 8
+"""Height at the bottom of a window in which a widget may be cut off."""
 DEADLINE_S = 120.0
 """For a condition that always comes true; generous, because the first run compiles the core."""
 
@@ -141,7 +143,7 @@ class Driver:
         self.until(lambda app: imgui.internal.find_window_by_name(window) is not None)
         frame = imgui.internal.find_window_by_name(window)
         wanted = frame.get_id(widget)
-        while (place := self._place_of(wanted)) is None:
+        while (place := self._place_of(wanted)) is None or place[1] > frame.pos.y + frame.size.y - BORDER_PX:
             if self.app.wait_s == 0:  # what was sent before may still bring it
                 continue
             before = frame.scroll.y
