@@ -14,6 +14,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.depth.guess import box_filter
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_pieces
@@ -96,23 +97,22 @@ def _smooth(luma: FloatImage) -> FloatImage:
     return luma
 
 
-def _in_same_light(luma: FloatImage, light: Doubles) -> FloatImage:
+def _in_same_light(luma: FloatImage, light: FloatImage) -> FloatImage:
     """Return a luma as bright around each pixel as `light`: exposure and vignetting differ from view to view."""
     return (luma * ((light + MIN_LIGHT) / (_light(luma) + MIN_LIGHT))).astype(np.float32)
 
 
-def _light(luma: FloatImage) -> Doubles:
+def _light(luma: FloatImage) -> FloatImage:
     """Return the mean (H, W) around each pixel."""
     radius = round(LIGHT_SHARE * max(luma.shape))
-    return _box_mean(np.pad(luma, radius, "edge"), radius)[radius:-radius, radius:-radius]
+    return box_filter(np.pad(luma, radius, "edge"), radius)[radius:-radius, radius:-radius]
 
 
 def find_corners(luma: FloatImage) -> NDArray[np.int64]:
     """Return places (P, 2), row and column, of points that differ from their neighbours in every direction."""
     down, across = (np.asarray(slope, np.float32) for slope in np.gradient(luma))
     radius = PATCH_RADIUS_PX
-    squares = (_box_mean(product, radius) for product in (down * down, across * across, down * across))
-    tt, ss, ts = squares
+    tt, ss, ts = (box_filter(product, radius) for product in (down * down, across * across, down * across))
     weaker = (tt + ss) / 2 - np.sqrt(((tt - ss) / 2) ** 2 + ts**2)
     rows, columns = (
         np.linspace(radius + 1, length - radius - 1, cells + 1).astype(int) for length, cells in zip(luma.shape, CELLS)
@@ -124,16 +124,6 @@ def find_corners(luma: FloatImage) -> NDArray[np.int64]:
             y, x = np.unravel_index(cell.argmax(), cell.shape)
             found.append((top + int(y), left + int(x)))
     return np.array(found, np.int64).reshape(-1, 2)
-
-
-def _box_mean(values: FloatImage, radius: int) -> Doubles:
-    """Return the mean (H, W) over squares; 0 where a square leaves the image."""
-    side, mean = 2 * radius + 1, np.zeros(values.shape)
-    if min(values.shape) >= side:
-        sums = np.pad(values.astype(float).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
-        inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-        mean[radius : radius + inside.shape[0], radius : radius + inside.shape[1]] = inside / side**2
-    return mean
 
 
 @kernel
