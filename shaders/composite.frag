@@ -17,10 +17,17 @@ void main() {
     // one surface add up; surfaces apart hide each other by chance.
     float passed = 1.0, covered = 0.0;
     uint left = slices;
+    int last = -1;
     while (left != 0u && passed * (1.0 - covered) > HIDES) {
         uint lowest = left & (~left + 1u);
         left ^= lowest;
         int k = int(log2(float(lowest)) + 0.5);
+        // A slice that is not near interrupts a surface as one without coverage here does.
+        if (k > last + 1) {
+            passed *= 1.0 - covered;
+            covered = 0.0;
+        }
+        last = k;
         vec4 slice = textureLod(atlas, (places[k].xy + places[k].z * gl_FragCoord.xy) / size, 0.0);
         float alpha = clamp(slice.a, 0.0, 1.0), stays_open = min(alpha / OPEN_AT, 1.0);
         float closed = 1.0 - (1.0 - stays_open) * covered;
