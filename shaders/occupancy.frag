@@ -17,9 +17,8 @@ void main() {
         for (int y = 0; y < block_px; y++) {
             for (int x = 0; x < block_px; x++) {
                 ivec2 at = pixel_of(surface, first + ivec2(x, y));
-                float diameter = texelFetch(defocus, at, 0).r;
-                int bin = clamp(int(bin_of.x * diameter + bin_of.y), 0, BINS - 1);
-                slices |= diameter < NOWHERE ? bins[bin] : 0u;
+                int bin = clamp(int(bin_of.x * texelFetch(defocus, at, 0).r + bin_of.y), 0, BINS - 1);
+                slices |= texelFetch(surfaces, at, 0).a > 0.0 ? bins[bin] : 0u;
             }
         }
     }

@@ -18,7 +18,7 @@ in vec2 uv;
 layout(location = 0) out vec4 light;
 layout(location = 1) out vec4 disc;
 
-const float NOWHERE = 4e6;         // diameter where there is no surface, as in slices.glsl: no slice has it
+const float NOWHERE = 4e6;         // diameter where there is no surface: no slice has it
 const float MIN_STEP_PX = 1.0;     // least difference of discs at a depth edge
 const float MIN_LEVELS = 2.5;      // the same where a disparity has 8 bits, in its levels
 const float SLOPE_SHARE = 0.25;    // as in iibr_core/surfaces.py

@@ -1,7 +1,6 @@
 // Slices of defocus, see iibr_core/beyond/lens_slices.py. The surfaces of a picture are stacked in two textures: the
 // fringes of mixed pixels, what the eye sees, what lies behind.
 const int SURFACES = 3;
-const float NOWHERE = 4e6;  // diameter where there is no surface, as in surfaces.frag
 
 uniform sampler2D surfaces;  // linear light times coverage, coverage
 uniform sampler2D defocus;   // signed diameters of discs, px
