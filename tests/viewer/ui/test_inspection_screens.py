@@ -200,9 +200,9 @@ def test_marks_in_an_epi_show_the_viewpoint_and_the_slope_of_the_surface(viewer)
 
 def test_a_zoomed_picture_has_its_own_values_strips_and_a_frame_on_the_minimap(viewer):
     viewer.do(do(inspection.show_values, True), do(inspection.show_epis, True))
-    viewer.do(do(viewpoint.set_zoom, Zoom(3 * layout_now(viewer).fit, (0.7, 0.4))))
-    viewer.do(do(inspection.set_hover, Hover(58.0, 26.0, None)))
     size = ScreenSize(1100, 900)
+    fit = layout_for(viewer.state, size, 1.0, 1.0).fit
+    viewer.do(do(viewpoint.set_zoom, Zoom(3 * fit, (0.7, 0.4))), do(inspection.set_hover, Hover(58.0, 26.0, None)))
     screen, layout = viewer.screen(size), layout_for(viewer.state, size, 1.0, 1.0)
     red, green, blue = viewer.state.inspection.probe.rgb
     assert red > green + 60 > blue, "the red square"
