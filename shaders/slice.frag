@@ -9,6 +9,10 @@ uniform int texel;    // side of a pixel of the target, px of the surfaces
 
 out vec4 sum;
 
+// Share of a slice that what the eye sees takes, from which on nothing behind it is in that slice: discs so alike part
+// no surfaces, and what is hidden would shine through.
+const float IN_FRONT = 0.05;
+
 void main() {
     ivec2 first = origin + (ivec2(gl_FragCoord.xy) - corner) * texel;
     sum = vec4(0.0);
@@ -19,7 +23,9 @@ void main() {
                 ivec2 place = pixel_of(surface, first + ivec2(x, y));
                 float diameter = texelFetch(defocus, place, 0).r;
                 float weight = clamp(min((diameter - tent.x) * tent.y, (tent.z - diameter) * tent.w), 0.0, 1.0);
-                if (weight > 0.0) shown += (1.0 - shown.a) * weight * texelFetch(surfaces, place, 0);
+                float room = 1.0 - shown.a;
+                if (surface == SURFACES - 1) room *= max(1.0 - shown.a / IN_FRONT, 0.0);
+                if (weight * room > 0.0) shown += weight * room * texelFetch(surfaces, place, 0);
             }
             sum += shown;
         }

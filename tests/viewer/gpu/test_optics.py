@@ -103,6 +103,20 @@ def test_highlights_behind_an_edge_count_for_more_too(renderer):
     assert (bright[inside] - bright[32, 48]).mean() == pytest.approx((1 + HIGHLIGHT_GAIN) * wall_share, rel=0.1)
 
 
+def test_nothing_shines_through_a_surface_that_lies_close_before_it(renderer):
+    """A dark wall that comes towards the eye, a bright one a little behind it: their discs are nearly the same."""
+    size = (96, 64)
+    disparity = np.tile(np.linspace(-3, 3, size[0], dtype=np.float32), (size[1], 1))
+    renderer.open_field(GridShape(1, 1), *size, hdr=False, with_disparity=True)
+    renderer.upload_view(0, 0, np.full((*size[::-1], 3), 60, np.uint8), disparity)
+    renderer.set_hidden(HiddenSurface(np.ones((*size[::-1], 3), np.float32), disparity - 0.6, disparity > -9))
+    optics = Optics(aperture_diameter=2.0)
+    picture = renderer.converged_picture(RenderSettings(optics, size, is_linear=True))
+    dark = float(linear_from_srgb(np.array(60 / 255)))
+    assert (picture - dark).mean() < 0.01
+    assert (picture - dark).max() < 0.1
+
+
 def test_saturated_colours_are_no_highlights(renderer):
     """A red wall whose red clips here and there: it shows the same with highlights recovered as without."""
     colors = np.full((30, 40, 3), (250, 90, 10), np.uint8)
