@@ -209,6 +209,17 @@ export class Renderer {
         gl.flush();
     }
 
+    // Returns a function that says whether all that has been drawn is done.
+    mark() {
+        const { gl } = this, sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+        gl.flush();
+        return () => {
+            const isDone = gl.isContextLost() || gl.getSyncParameter(sync, gl.SYNC_STATUS) === gl.SIGNALED;
+            if (isDone) gl.deleteSync(sync);
+            return isDone;
+        };
+    }
+
     // Adds a pass to the picture of the pinhole, or draws the disparity that it shows.
     pass(isDisparity = false) {
         const { gl, field, picture, picture: { lens, values } } = this, samples = samplesOf(lens, field, isDisparity);

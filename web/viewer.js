@@ -14,6 +14,7 @@ const TILT_DEG = 20;  // Turn of a device that leads to the outermost view.
 const DETAIL = 2, MOST_SIDE_PX = 4096;  // Largest number of drawn pixels: for a pixel of a view; of the longer side.
 const CLOSED_STOPS = 6;  // Length of the aperture's slider in stops, from the widest to a pinhole.
 const SLOW_MS = 45, QUICK_MS = 24;  // Time of a frame, while the hand moves, above and below which quality changes.
+const CLOSING_MS = 400;  // Time of the coarsest frame from which on the lens stays closed while the hand moves.
 
 function hint(text) {
     say(text);
@@ -23,7 +24,7 @@ function hint(text) {
 class Page {
     constructor(field) {
         const canvas = $("view"), still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-        Object.assign(this, { field, canvas, part: WHOLE, level: 0, changed: true, drawnAt: 0, moves: 0 });
+        Object.assign(this, { field, canvas, part: WHOLE, level: 0, isClosing: false, changed: true, drawnAt: 0, moves: 0 });
         this.optics = { eye: { t: 0, s: 0 }, ...field.optics };
         this.swings = !still && field.order.length > 1;
         this.pointers = new Map();
@@ -113,23 +114,36 @@ class Page {
         const { renderer } = this;
         this.asked = 0;
         if (this.session || renderer.gl.isContextLost()) return;  // a headset shows the picture
-        if (this.swings) this.swing(now);
-        const took = now - this.drawnAt;
-        if (this.changed || (took > 150 && !this.isBest)) {
-            // As good as there is time for while the hand moves, the best once it rests.
-            const change = this.changed && took < 400 ? (took > SLOW_MS) - (took < QUICK_MS) : 0;
-            this.level = clamp(this.level + change, 0, NUMBERS.LEVELS.length - 1);
-            const level = NUMBERS.LEVELS[this.changed ? this.level : 0];
-            renderer.begin(this.optics, this.part, ...this.size(level.scale), level);
-            this.steps = renderer.steps(this.changed);
-            this.isBest = level === NUMBERS.LEVELS[0];
-            [this.drawnAt, this.changed] = [now, false];
+        if (!this.isDone()) {  // what waits for the graphics card would only come later
+            this.asked ||= requestAnimationFrame((next) => this.frame(next));
+            return;
         }
-        if (this.steps.next().done && this.isBest && !this.swings) {
+        if (this.isMoving) this.adapt(now - this.drawnAt);
+        this.isMoving = false;
+        if (this.swings) this.swing(now);
+        if (this.changed || (now - this.drawnAt > 150 && !this.isBest)) {
+            // As good as there is time for while the hand moves, the best once it rests.
+            const { LEVELS } = NUMBERS, level = LEVELS[this.changed ? this.level : 0];
+            const optics = this.changed && this.isClosing ? { ...this.optics, aperture: 0 } : this.optics;
+            renderer.begin(optics, this.part, ...this.size(level.scale), level);
+            this.steps = renderer.steps(this.changed);
+            this.isBest = level === LEVELS[0] && optics === this.optics;
+            Object.assign(this, { drawnAt: now, isMoving: this.changed, changed: false });
+        }
+        const { done } = this.steps.next();
+        this.isDone = renderer.mark();
+        if (done && this.isBest && !this.swings) {
             document.documentElement.dataset.state = "still";
             return;
         }
         this.asked ||= requestAnimationFrame((next) => this.frame(next));
+    }
+
+    // Takes the time of a frame that was drawn while the hand moved.
+    adapt(took) {
+        const last = NUMBERS.LEVELS.length - 1;
+        this.isClosing ||= took > CLOSING_MS && this.level === last && this.optics.aperture > 0;
+        this.level = clamp(this.level + (took > SLOW_MS) - (took < QUICK_MS), 0, last);
     }
 
     swing(now) {
@@ -307,7 +321,7 @@ async function start() {
             if (renderer !== newest) return;
             page ??= new Page(field);
             if (count === 1) {  // the middle view shows alone until all are there
-                Object.assign(page, { field, renderer });
+                Object.assign(page, { field, renderer, isDone: () => true, isMoving: false });
                 canvas.hidden = false;
                 page.set({});
             }

@@ -197,3 +197,47 @@ def test_tilting_moves_the_viewpoint_rests_in_noise_and_stops(shown) -> None:
     shown.press("r")
     wait_until_still(shown)
     assert tilt(beta=60, gamma=0) == first
+
+
+SLOW_LENS = """
+const { fenceSync, drawArrays, getSyncParameter } = WebGL2RenderingContext.prototype, ends = new WeakMap();
+let blocks = 0;
+window.passes = [];
+Object.assign(WebGL2RenderingContext.prototype, {
+    drawArrays(mode, ...rest) { blocks += mode === this.POINTS; return drawArrays.call(this, mode, ...rest); },
+    fenceSync(...rest) {
+        const sync = fenceSync.call(this, ...rest);
+        ends.set(sync, performance.now() + (blocks ? 450 : 0));
+        window.passes.push(blocks);
+        blocks = 0;
+        return sync;
+    },
+    getSyncParameter(sync, name) {
+        return performance.now() < ends.get(sync) ? this.UNSIGNALED : getSyncParameter.call(this, sync, name);
+    },
+});
+"""
+"""A graphics card that takes 450 ms for each part of a picture through an open lens, however small it is."""
+MOVING = """
+passes.length = 0;
+window.moves = true;
+const move = () => {
+    document.getElementById("focus").dispatchEvent(new Event("input"));
+    if (window.moves) requestAnimationFrame(move);
+};
+move();
+"""
+
+
+def test_a_lens_that_is_too_slow_closes_while_the_hand_moves(tab, page) -> None:
+    tab.resize(480, 640)
+    tab.call("Page.addScriptToEvaluateOnNewDocument", source=SLOW_LENS)
+    tab.open(page.as_uri())
+    wait_until_still(tab)
+    slide_aperture(tab, 1.5)
+    wait_until_still(tab)
+    tab.evaluate(MOVING)
+    tab.wait_until("passes.at(-1) === 0")
+    tab.evaluate("passes.length = 0, moves = false")
+    wait_until_still(tab)
+    assert tab.evaluate("passes.some(Boolean)"), "the lens opens again"
