@@ -32,7 +32,7 @@ class Remedy(Enum):
 
 
 class FixableError(InputError):
-    """Bad input with a known remedy. The message is what is wrong; each interface adds its words for the remedy."""
+    """Bad input with a known remedy. The message states the fault; each interface adds its words for the remedy."""
 
     def __init__(self, message: str, remedy: Remedy | None = None) -> None:
         super().__init__(message)

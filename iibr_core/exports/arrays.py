@@ -14,7 +14,7 @@ from iibr_core.method.memory import require_memory
 
 
 def write_arrays(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write all views, what is known of their disparity, and their places, as arrays of an NPZ file.
+    """Write all views, their known disparity and their places as arrays of an NPZ file.
 
     views: (rows, columns, H, W, 3), bytes, sRGB-encoded. disparity: (rows, columns, H, W), float32, in pixels per view
     step, larger is nearer, NaN where it is not known. offsets: (rows, columns, 2), steps down and right of the centre.

@@ -59,7 +59,7 @@ def write_blur(path: Path, source: ExportSource, options: ExportOptions) -> str:
 
 
 def write_depth_mask(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write a mask of what is in focus: white, with ends that are soft over `options.soft` of disparity."""
+    """Write a mask of the surfaces in focus: white, with ends that are soft over `options.soft` of disparity."""
     beside = np.abs(_out_of_focus(at_own_size(source).disparity, source.optics)) / max(options.soft, 1e-9)
     share = np.clip(1 - beside, 0, 1)
     write_grey(path, share * share * (3 - 2 * share))

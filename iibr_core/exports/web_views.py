@@ -130,7 +130,7 @@ class ViewStore:
     """The views of a form, in 8 bits, to be encoded more than once."""
 
     def __init__(self, grid: GridShape, form: WebForm, space: ColorSpace) -> None:
-        """Begin without views. form: tells which are stored. space: their colour space.
+        """Begin without views. form: the grid that is stored. space: colour space of the views.
 
         The page has sRGB for sRGB views and Display P3 for others.
         """

@@ -71,7 +71,7 @@ class LensOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class LensViews:
-    """Source of the views that a lens adds up, and the scene that tells its f-numbers.
+    """Source of the views that a lens adds up, and the scene that its f-numbers follow from.
 
     maker_of: function (optics, reach) that returns a maker of views up to `reach` view steps from the middle, in which
     points in focus do not move and highlights are recovered.

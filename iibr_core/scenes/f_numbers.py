@@ -39,7 +39,7 @@ def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
 
 
 def aperture_of(scene: Scene, stop: float) -> float | None:
-    """Return the aperture in view steps of an f-number, exact or equivalent as it is shown; None without depth."""
+    """Return the aperture in view steps of an f-number, as the window shows it; None without depth."""
     unit = f_number(scene, 1.0) or equivalent_f_number(scene, 1.0)
     return None if unit is None else unit / stop
 

@@ -90,7 +90,7 @@ class LensChoice:
         return [kind for kind, value in chosen.items() if value is not None]
 
     def shape_on(self, shape: ApertureShape) -> ApertureShape:
-        """Return the chosen shape. shape: of what is not chosen. Raises InputError for numbers that change nothing."""
+        """Return the chosen shape. shape: gives the other numbers. Raises InputError for useless numbers."""
         kind = next(iter(self._kinds), shape.kind)
         if self.rotation is not None and kind not in TURNED:
             raise InputError(f"rotation {self.rotation:g}: turns blades or a mask; give one of them, or leave it out")
@@ -130,7 +130,7 @@ class LensChoice:
     def optics_on(self, scene: Scene, disparity: FloatImage | None = None, optics: Optics = PINHOLE) -> Optics:
         """Return the optics as near to the choices as the scene allows; a focus opens a pinhole a little.
 
-        disparity (H, W): of the centre view, needed for `focus_at`. optics: of what is not chosen. Raises InputError
+        disparity (H, W): of the centre view, needed for `focus_at`. optics: give the other numbers. Raises InputError
         if the scene has no depth for a choice, or no such place, and as `shape_on` does.
         """
         return clamp_optics(self.wanted_on(scene, disparity, optics), scene)

@@ -39,7 +39,7 @@ FIRST_SKETCH = ImageSize(height=1000, width=1000)
 SKETCH_WORTH_PIXELS = 1_500_000
 """Number of pixels from which on a photo gets a sketch: smaller ones are read quickly, unless kernels are missing."""
 MAX_SIDE_PX = 16_384
-"""Longest side of a photo as it is opened: the limit of most graphics drivers."""
+"""Longest side of an open photo in pixels: the limit of most graphics drivers."""
 
 
 def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks_model: bool = True) -> LoadedPhoto:
@@ -173,7 +173,7 @@ def lens_views_of(
 ) -> Callable[[ViewOffset], View]:
     """Return a maker of the photo's sRGB views up to `reach` view steps away, as a lens needs them.
 
-    What is in focus does not move, so it is as sharp as in the photo; clipped highlights are recovered.
+    Surfaces in focus do not move, so they are as sharp as in the photo; clipped highlights are recovered.
     """
     field, photo, side = plan.field_disparity(loaded.disparity), photo_in_srgb(loaded.photo), 2 * math.ceil(reach) + 1
     gain = optics.highlight_gain(optics.aperture_diameter, photo.is_hdr)

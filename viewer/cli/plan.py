@@ -46,7 +46,7 @@ def _lines_of_photo(source: Source, depth_strength: float) -> list[str]:
 
 
 def _lines_of_views(source: Source) -> list[str]:
-    """Return the name, layout and source of disparity of a light field, then what is known about its views."""
+    """Return the name, layout and source of disparity of a light field, then the facts about its views."""
     from iibr_core.formats.light_fields.multi_view_scene import common_size
     from iibr_core.formats.light_fields.views import disparity_range
     from iibr_core.formats.maps.disparity_file import read_disparity

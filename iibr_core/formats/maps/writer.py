@@ -52,7 +52,7 @@ def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
     """Write an (H, W) map of finite values, whole or not at all; return a note about the file, or "".
 
     text: meaning of the values; PNG, TIFF and EXR keep it. A PNG holds values from 1 to 65535, and its text states
-    their scale and offset; all others hold float32. A name that says depth is refused for disparity.
+    their scale and offset; all others hold float32. A name that means depth is refused for disparity.
     """
     path = Path(path)
     kind = path.suffix.lower()

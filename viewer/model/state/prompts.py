@@ -48,7 +48,7 @@ class ExportPrompt:
 
 @dataclass(frozen=True)
 class Listing:
-    """What a folder holds, as far as it can be opened. typed: the folder as it was typed; path: the same, absolute."""
+    """Folders and files to choose in a folder. typed: the folder as it was typed; path: the same, absolute."""
 
     typed: str
     path: str

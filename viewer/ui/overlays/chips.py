@@ -26,7 +26,7 @@ _BARE = CARD_FLAGS | imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_ba
 
 def chips(state: AppState, layout: Layout) -> list[Action]:
     """Build the chip of the free camera at the right, which leaves it, or that of guessed depth at the left, which
-    offers better depth; a picture that is still coarse says so at the other side.
+    offers better depth; a coarse picture has a mark at the other side.
     """
     frame, camera = layout.frame, state.free_camera
     if frame is None or state.scene is None or state.inspection.shows_views or state.shows_before:

@@ -41,7 +41,10 @@ def filmstrip_paths(state: AppState, layout: Layout) -> tuple[str, ...]:
 
 
 def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnail | None]) -> list[Action]:
-    """Build the row: a click opens a photo, the right button its menu, the wheel scrolls. Damaged ones show a name."""
+    """Build the row: a click opens a photo, the right button its menu; the wheel scrolls.
+
+    A photo that cannot be read shows its name.
+    """
     rect, photos = layout.filmstrip, state.folder
     if rect is None or photos is None:
         return []
