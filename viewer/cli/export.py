@@ -57,7 +57,7 @@ def export(
     if not kind.path:
         kinds.require_export_place(kind, output, inputs, force)
     shared.require_source(source)
-    options, target = kind_options.options(keys, row, show), output
+    options, target, choice = kind_options.options(keys, row, show), output, lens.choice()
 
     def require_place(opened: Scene) -> None:
         nonlocal target
@@ -73,11 +73,11 @@ def export(
 
             open_drawn = stack.enter_context(OffscreenScene()).open_for_export
         with show_progress("reading"):
-            opened = open_for_export(
-                kind, options, source, scene.depth_strength, lens.choice(), require_place, open_drawn
-            )
+            opened = open_for_export(kind, options, source, scene.depth_strength, choice, require_place, open_drawn)
         with show_progress("exporting"):
             message = write_export(kind, target, opened, options)
     print(target)
-    notes = lens.notes(opened.optics, opened.scene, "aperture" in kind.supports)
+    notes = lens.limit_notes(opened.optics, opened.scene)
+    if "aperture" in kind.supports:
+        notes += choice.notes(opened.optics, opened.scene)
     print_notes(*opened.scene.notes, *notes, message, origin=opened.scene.depth_origin)

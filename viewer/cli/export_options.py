@@ -45,7 +45,6 @@ FRAMES_TEXT = "Number of frames of an animation or pictures of a focal stack."
 FRAMES_DEFAULT = f"{kinds.DEFAULT_SECONDS:g} s; {defaults_of('frames')}"
 SIZE_DEFAULT = f"the photo's; largest width: {defaults_of('max_width_px')}"
 SLOWEST, FASTEST = kinds.RATE_LIMITS
-MIN_TOLERANCE, MAX_TOLERANCE = TOLERANCE_LIMITS
 
 
 @dataclass(frozen=True)

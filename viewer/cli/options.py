@@ -341,8 +341,8 @@ class LensOptions:
             if not low <= value <= high:
                 raise InputError(f"--view: {axis} is {value:g}; {scene.name} has {low:g} to {high:g}")
 
-    def notes(self, optics: Optics, scene: Scene, has_aperture: bool = True) -> tuple[str, ...]:
-        """Return a note for each value that the scene limits, and for values without effect on a closed aperture."""
+    def limit_notes(self, optics: Optics, scene: Scene) -> tuple[str, ...]:
+        """Return a note for each value that the scene limits."""
         right, down = self.tilt or (None, None)
         pairs = (
             ("--focus", self.focus, optics.focus_disparity),
@@ -362,7 +362,7 @@ class LensOptions:
             notes.append(f"--f-number {self.f_number:g} is wider than the lens opens; f/{widest:.2g} is used.")
         if scene.plan is None and optics.aperture_diameter > max(scene.grid):
             notes.append("The lens is wider than the light field: what no view shows is inpainted.")
-        return (*notes, *(self.choice().notes(optics, scene) if has_aperture else ()))
+        return tuple(notes)
 
 
 def gloss_of(path: Path | None) -> Gloss | None:

@@ -135,8 +135,9 @@ def screenshot(
     print(output)
     own_size, view_size = (ImageSize(size.height, size.width) for size in (opened.own_size or opened.size, opened.size))
     unimportant = smaller_note(own_size, view_size) if draws_own else ""
-    notes = (each for each in opened.notes if each != unimportant)
-    print_notes(note, *notes, *lens.notes(optics, opened), origin=opened.depth_origin)
+    notes = [each for each in opened.notes if each != unimportant]
+    notes += [*lens.limit_notes(optics, opened), *choice.notes(optics, opened)]
+    print_notes(note, *notes, origin=opened.depth_origin)
 
 
 def _display(context: typer.Context, calibration: Path | None, output: Path) -> Calibration | None:
