@@ -40,10 +40,8 @@ def at_own_size(source: ExportSource) -> OwnSize:
         large = load_large(scene.source, loaded, source.plan(), MAX_PIXELS)
         enlarged = large.size.width / scene.width
         return OwnSize(large.pixels, large.disparity / np.float32(enlarged), enlarged)
-    view = source.centre_view()
-    if view.disparity is None:
-        raise InputError(f"{scene.name}: has no depth; open it with a disparity map")
-    return OwnSize(encoded_from_stored(view.colors), view.disparity, 1.0)
+    view, disparity = source.depth_view()
+    return OwnSize(encoded_from_stored(view.colors), disparity, 1.0)
 
 
 def write_blur(path: Path, source: ExportSource, options: ExportOptions) -> str:

@@ -60,7 +60,5 @@ def write_epi(path: Path, source: ExportSource, options: ExportOptions) -> None:
 
 def _disparity_of(source: ExportSource) -> tuple[NDArray[np.uint8], FloatImage]:
     """Return colours (H, W, 3) and disparity (H, W) of the centre view."""
-    view = source.centre_view()
-    if view.disparity is None:
-        raise InputError(f"{source.scene.name}: has no depth; open it with a disparity map")
-    return colors_of(view), view.disparity
+    view, disparity = source.depth_view()
+    return colors_of(view), disparity

@@ -23,7 +23,7 @@ from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset, ViewUpdate
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
 
 if TYPE_CHECKING:
     from iibr_core.formats.images.metadata import PictureMetadata
@@ -153,6 +153,13 @@ class ExportSource:
             return next(views)
         finally:
             views.close()
+
+    def depth_view(self) -> tuple[ViewUpdate, FloatImage]:
+        """Return the centre view, and its disparity (H, W). Raises InputError without one."""
+        view = self.centre_view()
+        if view.disparity is None:
+            raise InputError(f"{self.scene.name}: has no depth; open it with a disparity map")
+        return view, view.disparity
 
     def write_picture(
         self, path: Path, pixels: NDArray[Any], form: PictureFormat = AS_USUAL, color_space: ColorSpace = SRGB

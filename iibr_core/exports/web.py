@@ -21,7 +21,7 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.extras import how_to_install
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
-from iibr_core.scenes.f_numbers import equivalent_f_number, f_number
+from iibr_core.scenes.f_numbers import f_number, unit_f_number
 from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits, focus_span
 from iibr_core.scenes.outer_views import OuterViews
 from iibr_core.types import SRGB, ImageSize
@@ -157,7 +157,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "apertureLimits": [0.0, aperture_limit(scene)],
         "rangeLimits": [0.0, scale * focus_span(scene)],
         "firstAperture": first_aperture(scene),
-        "unitFNumber": (f_number(scene, 1.0) or equivalent_f_number(scene, 1.0)) if views.has_disparity else None,
+        "unitFNumber": unit_f_number(scene) if views.has_disparity else None,
         "isExactFNumber": f_number(scene, 1.0) is not None,
         "optics": {
             "focus": lens.focus_disparity,

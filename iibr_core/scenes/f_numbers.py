@@ -40,8 +40,13 @@ def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
 
 def aperture_of(scene: Scene, stop: float) -> float | None:
     """Return the aperture in view steps of an f-number, as the window shows it; None without depth."""
-    unit = f_number(scene, 1.0) or equivalent_f_number(scene, 1.0)
+    unit = unit_f_number(scene)
     return None if unit is None else unit / stop
+
+
+def unit_f_number(scene: Scene) -> float | None:
+    """Return the f-number of an aperture of one view step, exact or else equivalent; None without depth."""
+    return f_number(scene, 1.0) or equivalent_f_number(scene, 1.0)
 
 
 def disparity_as_given(scene: Scene, disparity: float) -> float | None:

@@ -70,10 +70,8 @@ class Lens:
         """Width of the border around the picture whose light the discs spread into it, in output pixels."""
         if not self.slices:
             return 0
-        return (
-            -(-math.ceil(max(each.reach_px for each in self.slices) + EDGE_MARGIN_PX) // MARGIN_STEP_PX)
-            * MARGIN_STEP_PX
-        )
+        reach_px = max(each.reach_px for each in self.slices) + EDGE_MARGIN_PX
+        return MARGIN_STEP_PX * math.ceil(reach_px / MARGIN_STEP_PX)
 
     def barrel(self, aspect: float) -> tuple[float, float, float]:
         """Return the motion of the barrel's opening across the picture (s, t) and its radius, in radii of the opening.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePath
 from typing import NamedTuple, TypeVar
 
@@ -145,16 +146,20 @@ def text_field(
     name: str, text: str, hint: str = "", flags: int = 0, complete: Callable[[str], str] | None = None
 ) -> tuple[str, bool]:
     """Draw a text field; return the text, and whether Enter was pressed in it. complete: what Tab makes of the text."""
-
-    def replace_text(data: imgui.InputTextCallbackData) -> int:
-        new = complete(str(data.buf)) if complete is not None else str(data.buf)
-        data.delete_chars(0, data.buf_text_len)
-        data.insert_chars(0, new)
-        return 0
-
-    flags |= imgui.InputTextFlags_.callback_completion if complete is not None else 0
-    _, new = imgui.input_text_with_hint(f"##{name}", hint, text, flags, replace_text if complete is not None else None)
+    replace_text = None
+    if complete is not None:
+        flags |= imgui.InputTextFlags_.callback_completion
+        replace_text = partial(_replace_text, complete)
+    _, new = imgui.input_text_with_hint(f"##{name}", hint, text, flags, replace_text)
     return new, bool(imgui.is_item_deactivated() and is_enter())
+
+
+def _replace_text(complete: Callable[[str], str], data: imgui.InputTextCallbackData) -> int:
+    """Put the completed text in the place of that in a field."""
+    new = complete(str(data.buf))
+    data.delete_chars(0, data.buf_text_len)
+    data.insert_chars(0, new)
+    return 0
 
 
 def search_field(name: str, text: str, hint: str) -> tuple[str, bool]:

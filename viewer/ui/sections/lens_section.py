@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import EXPOSURE_LIMIT_STOPS, RING_INNER_LIMIT, ApertureKind, ApertureShape
 from iibr_core.scenes.f_numbers import ASSUMED_DISTANCE_M, f_number
+from iibr_core.scenes.lens_choice import TURNED
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, clamp, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, units
@@ -152,9 +153,7 @@ def _shape_rows(shape: ApertureShape) -> ApertureShape:
     if shape.kind == "cat_eye":
         edited = replace(shape, cat_eye=slider("Cut off", shape.cat_eye, (0.0, 1.0), "%.2f"))
     roundness = percent_slider("Roundness", shape.roundness, ROUNDNESS_TIP, is_enabled=shape.kind == "polygon")
-    rotation = slider(
-        "Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", is_enabled=shape.kind in ("polygon", "mask")
-    )
+    rotation = slider("Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", is_enabled=shape.kind in TURNED)
     return replace(edited, roundness=roundness, rotation_deg=rotation)
 
 
