@@ -48,9 +48,9 @@ from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core import embedded_files
 from viewer.app.picture_files import read_settings
 from viewer.app.preferences_store import load_preferences
+from viewer.model.app_state import AppState
 from viewer.model.saved_settings import settings_text
-from viewer.model.state.app_state import AppState
-from viewer.model.state.saving import SavedSettings
+from viewer.model.saving import SavedSettings
 
 OUT = Path("out/fuzz")
 TIME_LIMIT_S = 60.0

@@ -24,8 +24,8 @@ from iibr_core.types import FloatImage, ViewOffset
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import inspection, lens, messages
 from viewer.model.action import do
-from viewer.model.state.app_state import Hover
-from viewer.model.state.preferences import Section, with_sections
+from viewer.model.inspection import Hover
+from viewer.model.preferences import Section, with_sections
 
 ROOT = Path(__file__).parents[1]
 DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"

@@ -54,7 +54,7 @@ def headless_with_scene(folder, *open_sections):
     """
     from iibr_core.scenes.scene import Source
     from viewer.display.offscreen import OffscreenScene
-    from viewer.model.state.preferences import with_sections
+    from viewer.model.preferences import with_sections
 
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)))
@@ -242,8 +242,8 @@ def open_window(display, no_egl_context):
     """
     from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
-    from viewer.model.state.app_state import AppState
-    from viewer.model.state.preferences import Preferences, with_sections
+    from viewer.model.app_state import AppState
+    from viewer.model.preferences import Preferences, with_sections
 
     apps = []
     sections = with_sections((), "view", "focus", "aperture", "light")

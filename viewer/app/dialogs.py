@@ -13,7 +13,9 @@ from imgui_bundle import portable_file_dialogs as dialogs
 
 from iibr_core.exports.kinds import export_kind
 from iibr_core.exports.photo_folder import in_order, list_photos
-from viewer.model.state.prompts import ChoiceOf, ExportPrompt, Listing, SavePrompt
+from viewer.model.browsing import Listing
+from viewer.model.saving import ExportPrompt, SavePrompt
+from viewer.model.tasks import ChoiceOf
 
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first that it finds."""

@@ -9,7 +9,7 @@ from iibr_core.formats.maps.map_names import is_map_path
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
 from viewer.model import opening
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 
 def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:

@@ -25,9 +25,9 @@ from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
 from viewer.model import messages, viewpoint
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
+from viewer.model.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
 
 if TYPE_CHECKING:
     from iibr_core.beyond.free_cameras import FreeViews

@@ -34,9 +34,9 @@ from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot, snapshot_of
 from viewer.model import saving
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.carried_optics import carry_optics
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import STOPPING, WAITING_FOR_VIEWS, ExportPrompt, JobKind, JobProgress, SavePrompt
+from viewer.model.saving import STOPPING, WAITING_FOR_VIEWS, ExportPrompt, JobKind, JobProgress, SavePrompt
 
 Needs = Literal["shown", "photo", "views"]
 """The part of the scene that a job needs: what the window shows now, the photo and its plan, or all its views."""

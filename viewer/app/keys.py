@@ -12,8 +12,8 @@ from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
 from viewer.model import depth, inspection, lens, messages, selection, stereo, viewpoint, window
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME, COMMANDS, Chord
-from viewer.model.state.app_state import AppState
 
 ARROW_STEP_VIEWS = 0.5
 """Step of an arrow key, in view steps."""

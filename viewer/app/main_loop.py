@@ -34,14 +34,14 @@ from viewer.background.newest import Newest
 from viewer.background.tracker import Tracker
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
-from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
+from viewer.display.scene_view import VIEW_REFRESH_S, Picture, SceneView
 from viewer.gpu.context import create_for_window
 from viewer.model import gesture, inspection, opening, preferences, saving, selection, viewpoint, window
-from viewer.model.action import Action, ask, do
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.inspection import NO_INSPECTION_TEXTURES
 from viewer.model.layout import Layout, is_narrow
-from viewer.model.state.app_state import AppState, Picture
-from viewer.model.state.tasks import PlainTask
+from viewer.model.tasks import PlainTask, ask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.overlays.path_prompt import browsed_paths

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from viewer.model import messages
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
 
 IDLE_WAIT_S = 1.0
 """Longest sleep in seconds; it only bounds the harm of a lost wake-up."""

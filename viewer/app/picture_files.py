@@ -16,9 +16,8 @@ from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
-from viewer.model.saving import settings_of
-from viewer.model.state.app_state import AppState
-from viewer.model.state.saving import SavedSettings
+from viewer.model.app_state import AppState
+from viewer.model.saving import SavedSettings, settings_of
 
 
 @dataclass(frozen=True, eq=False)

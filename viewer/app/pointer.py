@@ -15,11 +15,11 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model import depth, inspection, lens, selection, viewpoint
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.depth import DepthSample
 from viewer.model.focal_plane import handle_points, place_of
-from viewer.model.inspection import view_at
+from viewer.model.inspection import Hover, view_at
 from viewer.model.layout import Layout, pixel_at
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.depth import DepthSample
 
 DRAG_THRESHOLD = 4.0
 """Distance, in window units, from which on a press is a drag and no click."""

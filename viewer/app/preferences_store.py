@@ -18,11 +18,10 @@ from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
 from viewer.model import messages
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
 from viewer.model.opening import MAX_RECENT
-from viewer.model.preferences import FONT_SCALE_LIMITS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import Preferences
+from viewer.model.preferences import FONT_SCALE_LIMITS, Preferences
 from viewer.model.tracking import HEAD_RANGE_LIMITS
 
 PREFERENCES_FILE = "preferences.json"

@@ -29,11 +29,11 @@ from viewer.app.picture_files import SavedShot, export_picture, require_picture_
 from viewer.background.newest import message_of
 from viewer.model import messages, saving
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
 from viewer.model.remedies import words_of
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import WRITING, ExportPrompt, SavePrompt
-from viewer.model.state.tasks import ExportTask, SaveTask
+from viewer.model.saving import WRITING, ExportPrompt, SavePrompt
+from viewer.model.tasks import ExportTask, SaveTask
 from viewer.model.viewpoint import clicked_rack
 
 OPEN_PHOTO = "This is the open photo. Choose another name."

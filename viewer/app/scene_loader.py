@@ -25,13 +25,13 @@ from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.model import depth, messages, opening, preferences
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.carried_optics import NewDepth
 from viewer.model.depth import is_ahead, settings_for_worker
 from viewer.model.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.lens import requested_strength
+from viewer.model.messages import Notice
 from viewer.model.remedies import words_of
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
 
 SKETCHES_FIRST = 3
 """Number of photos that are read at a small size before the open photo is read whole, so that quick steps show a

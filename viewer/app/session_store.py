@@ -19,12 +19,11 @@ from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.model import messages, opening
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.look import paste_look
+from viewer.model.messages import Notice
 from viewer.model.remedies import words_of
-from viewer.model.saving import settings_of
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.saving import SavedSettings
+from viewer.model.saving import SavedSettings, settings_of
 
 SESSIONS_FOLDER = "sessions"
 """Name of the folder of sessions within that of the user's settings."""

@@ -20,13 +20,13 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
 from viewer.background.newest import Failed, Newest, Post
 from viewer.background.window_work import WindowWork
-from viewer.display.scene_view import SceneView
+from viewer.display.scene_view import Picture, SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.model import messages
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState, Picture
-from viewer.model.state.notices import Notice
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
 
 if TYPE_CHECKING:
     from iibr_core.beyond.full_size import LargePhoto

@@ -23,17 +23,16 @@ from viewer.app.saving import add_copy, add_export, add_save
 from viewer.background.depth_models import actions_of_download, download, list_models
 from viewer.background.newest import Newest, message_of
 from viewer.display.scene_view import SceneView
-from viewer.model import browsing, depth_models, folder, lens, messages, opening, stereo
-from viewer.model.action import Action, ask, do, forget_tasks
+from viewer.model import browsing, depth_models, folder, lens, messages, opening, stereo, tasks
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.browsing import PathPrompt
 from viewer.model.commands import action_for_path
 from viewer.model.demo_photo import is_ours
-from viewer.model.opening import set_facts
+from viewer.model.folder import PhotoFacts, set_facts
+from viewer.model.messages import Notice
 from viewer.model.saving import path_beside
-from viewer.model.state import tasks
-from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import PhotoFacts
-from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import ChoiceOf, PathPrompt
+from viewer.model.tasks import ChoiceOf, ask, forget_tasks
 
 SAVE_BUDGET_S = 0.025
 """Time for drawing a picture that is being saved in a turn of the loop, in seconds: about as long as a frame."""

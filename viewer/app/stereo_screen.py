@@ -26,10 +26,10 @@ from viewer.gpu.render_targets import RenderTarget
 from viewer.gpu.weaving import show_texture
 from viewer.model import messages, stereo
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.stereo import Monitor, Weave
+from viewer.model.messages import Notice
+from viewer.model.stereo import Monitor, Weave
 
 
 class SecondWindow:

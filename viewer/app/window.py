@@ -22,7 +22,7 @@ from PIL import Image
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
-from viewer.model.state.stereo import Monitor
+from viewer.model.stereo import Monitor
 
 WINDOW_SIZE = (1280, 800)
 SMALLEST_SIZE = (200, 150)

@@ -18,10 +18,10 @@ from iibr_core.types import FloatImage, InputError
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import depth_models, messages
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.depth_models import Downloading, ModelOffer
+from viewer.model.messages import Notice
 from viewer.model.remedies import words_of
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import Downloading, ModelOffer
-from viewer.model.state.notices import Notice
 
 MEGABYTE = 1e6
 OFFLINE = "No internet connection. Nothing is lost."

@@ -17,9 +17,9 @@ from iibr_core.stages import CLOSED_FORM
 from viewer.background.newest import Failed, Newest, Post, Request, Result
 from viewer.model import messages
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import ViewIndex
-from viewer.model.state.notices import Notice
+from viewer.model.app_state import AppState
+from viewer.model.inspection import ViewIndex
+from viewer.model.messages import Notice
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps

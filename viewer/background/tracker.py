@@ -13,8 +13,8 @@ from collections.abc import Callable
 from iibr_core.types import InputError
 from viewer.model import messages, tracking
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
 
 WAIT_S = 0.2
 """Longest wait for a packet, in seconds: closing takes as long."""

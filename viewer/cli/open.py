@@ -12,7 +12,7 @@ from viewer.app.dropped_files import actions_from_drop
 from viewer.app.handover import hand_over
 from viewer.cli.options import require_source
 from viewer.cli.view import open_window
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 
 def open_photos(

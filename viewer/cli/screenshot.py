@@ -24,9 +24,9 @@ from viewer.cli import options as shared
 from viewer.cli.messages import print_notes, show_progress
 from viewer.cli.option_records import flag, option, output_option, with_option_records
 from viewer.model import opening
-from viewer.model.state.app_state import AppState
-from viewer.model.state.saving import SavedSettings
-from viewer.model.state.stereo import Stereo
+from viewer.model.app_state import AppState
+from viewer.model.saving import SavedSettings
+from viewer.model.stereo import Stereo
 
 if TYPE_CHECKING:
     from viewer.display.offscreen import OffscreenScene

@@ -15,9 +15,9 @@ from viewer.cli.option_records import option, with_option_records
 from viewer.cli.options import SCENE, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
 from viewer.model import stereo
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.demo_photo import demo_photo
-from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import StereoMode
+from viewer.model.stereo import StereoMode
 from viewer.model.tracking import address_of, switch
 
 

@@ -14,8 +14,8 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto, Source, still_disparity
 from iibr_core.types import FloatImage
 from viewer.display.scene_view import SceneView
+from viewer.model.app_state import AppState
 from viewer.model.depth import current_settings
-from viewer.model.state.app_state import AppState
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas

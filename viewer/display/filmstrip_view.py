@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from iibr_core.types import ImageSize
 from viewer.background.newest import Failed, Newest, Post
 from viewer.gpu.context import GLContext
-from viewer.model.state.folder import Thumbnail
+from viewer.model.folder import Thumbnail
 
 MAX_SIZE = ImageSize(height=96, width=144)
 """Largest size of a thumbnail in pixels."""

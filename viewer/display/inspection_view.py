@@ -26,11 +26,20 @@ from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model import selection
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.colormap import VIRIDIS
-from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, sheet_cells, view_near
+from viewer.model.inspection import (
+    NO_INSPECTION_TEXTURES,
+    Hover,
+    InspectionTextures,
+    Origin,
+    OverlayKind,
+    Probe,
+    ViewIndex,
+    sheet_cells,
+    view_near,
+)
 from viewer.model.layout import Layout, whole_pixels
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Origin, OverlayKind, Probe, ViewIndex
 
 MASK_COLORS = {"inpainted": (255, 184, 60), "surface": (80, 240, 220)}
 """Colours (sRGB bytes) of overlays that are masks."""

@@ -37,9 +37,9 @@ from viewer.display.stereo_view import StereoView
 from viewer.gpu.context import Backend, create_headless
 from viewer.model import opening, stereo, window
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, set_probe
 from viewer.model.layout import BACKGROUND, Layout, is_narrow
-from viewer.model.state.app_state import AppState
 
 LAYOUT_FRAMES = 3
 """Number of frames until the layout is settled: ImGui knows the size of a text once it was built."""

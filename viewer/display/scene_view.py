@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from iibr_core.beyond.optics import CENTRE, Optics
@@ -24,7 +24,8 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import box_around
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.refocus.views_seen import views_seen
-from viewer.model.state.app_state import AppState, DrawReport, Picture
+from viewer.model.app_state import AppState
+from viewer.model.window import DrawReport
 
 if TYPE_CHECKING:
     from iibr_core.beyond.hidden_surfaces import HiddenSurface
@@ -43,6 +44,23 @@ are made: a few more views change the noise, not the picture.
 """
 WAITING_VIEWS = 4
 """Number of waiting views at which the worker pauses."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Everything that the picture depends on.
+
+    generation: of the scene. views_uploaded, previews: numbers of views, and of previews of edited depth and gloss, so
+    far. samples: drawn so far. part: the part of the picture that is drawn, as a share of it.
+    """
+
+    generation: int
+    views_uploaded: int
+    optics: Optics
+    size_px: ScreenSize
+    samples: int = 0
+    previews: int = 0
+    part: Rect = WHOLE
 
 
 class SceneView:

@@ -13,7 +13,7 @@ from viewer.gpu.refocus.frame_budget import OVERHEAD_S
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.render_targets import RenderTarget
 from viewer.gpu.weaving import Weaver
-from viewer.model.state.stereo import Weave
+from viewer.model.stereo import Weave
 
 MAX_RENDERERS = 2
 """Largest number of pictures that are refined side by side; the targets of more would not fit the graphics card."""

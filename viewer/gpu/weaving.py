@@ -13,7 +13,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.render_targets import RenderTarget
-from viewer.model.state.stereo import Weave
+from viewer.model.stereo import Weave
 
 
 class Weaver:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from iibr_core.scenes.lens_limits import clamp
-from viewer.model.state.app_state import AppState
-from viewer.model.state.tasks import Task
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
 
 P = ParamSpec("P")
 Value = TypeVar("Value")
-Setter = Callable[[AppState, Value], AppState]
+Setter = Callable[["AppState", Value], "AppState"]
 """Verb that sets one field."""
 
 
@@ -44,13 +46,3 @@ def setter(path: str, limits: tuple[float, float] | None = None) -> Setter[Any]:
         return replace(state, **{record or name: changed})
 
     return verb
-
-
-def ask(state: AppState, task: Task) -> AppState:
-    """Ask the outside world to carry out a task; the loop takes it up in its next turn."""
-    return state.with_tasks(task)
-
-
-def forget_tasks(state: AppState, count: int) -> AppState:
-    """Forget the first tasks, which were taken up."""
-    return replace(state, tasks=state.tasks[count:])

@@ -3,13 +3,42 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import takewhile
 
 from viewer.model import messages
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import Listing, PathPrompt
-from viewer.model.state.tasks import ListTask
+from viewer.model.app_state import AppState
+from viewer.model.tasks import ChoiceOf, ListTask
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Folders and files to choose in a folder. typed: the folder as it was typed; path: the same, absolute."""
+
+    typed: str
+    path: str
+    folders: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PathPrompt:
+    """The prompt for the path of a file or folder, on systems without a file dialog.
+
+    listing: of the folder of `path`, None until it is read. top: first row of the listing that is seen.
+    """
+
+    what: ChoiceOf
+    path: str = ""
+    problem: str = ""
+    listing: Listing | None = None
+    top: int = 0
+
+    @property
+    def folder(self) -> str:
+        """The folder of the typed path, with a separator at its end; "" if none was typed."""
+        return self.path[: max(map(self.path.rfind, (os.sep, "/"))) + 1]
+
 
 UP = ".."
 

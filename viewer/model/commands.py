@@ -27,17 +27,25 @@ from viewer.model import (
     viewpoint,
     window,
 )
-from viewer.model.action import Action, ask, do
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.demo_photo import demo_photo
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import TOOLS, Tool
-from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
-from viewer.model.state.lens import PRESETS
-from viewer.model.state.preferences import SECTIONS
-from viewer.model.state.prompts import ChoiceOf, PalettePrompt
-from viewer.model.state.stereo import STEREO_MODES, StereoMode
-from viewer.model.state.tasks import ChooseTask, PlainTask
-from viewer.model.state.viewpoint import Zoom
+from viewer.model.depth import TOOLS, Tool
+from viewer.model.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
+from viewer.model.layout import Zoom
+from viewer.model.preferences import SECTIONS
+from viewer.model.presets import PRESETS
+from viewer.model.stereo import STEREO_MODES, StereoMode
+from viewer.model.tasks import ChoiceOf, ChooseTask, PlainTask, ask
+
+
+@dataclass(frozen=True)
+class PalettePrompt:
+    """The list of commands, narrowed down by the typed text. selected: index of the one that Enter runs."""
+
+    text: str = ""
+    selected: int = 0
+
 
 FONT_STEP = 1.1
 CAMERA_STEP = 0.05

@@ -1,11 +1,13 @@
-"""Editing of depth: verbs, and what follows from the state."""
+"""Editing of depth: records, verbs, and what follows from the state."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
+from typing import TYPE_CHECKING, Literal
 
 from iibr_core.depth.editing.edits import (
+    BRUSH_TOOLS,
     DEPTH_TOOLS,
     FEATHER_LIMITS,
     GAMMA_LIMITS,
@@ -13,6 +15,7 @@ from iibr_core.depth.editing.edits import (
     RADIUS_LIMITS,
     TOLERANCE_LIMITS,
     UNEDITED,
+    BrushTool,
     DepthEdits,
     Stroke,
 )
@@ -20,12 +23,44 @@ from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import DepthSettings
 from viewer.model.history import record_edit, undoable
 from viewer.model.inspection import set_overlay
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import Brush, DepthSample
-from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import with_sections
+from viewer.model.messages import Notice, notify
+from viewer.model.preferences import with_sections
 from viewer.model.stroke_path import longer_path
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+Tool = BrushTool | Literal["select"]
+TOOLS: tuple[Tool, ...] = (*BRUSH_TOOLS, "select")
+"""Tools for the picture: they paint, or select a surface."""
+
+
+@dataclass(frozen=True)
+class DepthSample:
+    """A place whose depth was picked, (x, y) as shares of the photo's width and height, and the disparity there."""
+
+    place: tuple[float, float]
+    disparity: float
+
+
+@dataclass(frozen=True)
+class Brush:
+    """The tool for the picture while it is on. radius, strength, tolerance, feather: see `Stroke`.
+
+    sample: source of the depth that "level" and "fill" paint, None: the beginning of the stroke. brought_overlay:
+    whether the depth overlay came with the brush, and goes with it.
+    """
+
+    tool: Tool = "nearer"
+    radius: float = 0.03
+    strength: float = 0.25
+    tolerance: float = 1.0
+    feather: float = 0.0
+    is_on: bool = False
+    sample: DepthSample | None = None
+    brought_overlay: bool = False
+
 
 MIN_CLIP_GAP = 0.01
 NO_DEPTH_HERE = "The depth of a light field from disk cannot be edited. Open a photo."

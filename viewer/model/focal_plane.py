@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
-from viewer.model.state.lens import TiltHandles
+
+if TYPE_CHECKING:
+    from viewer.model.lens import TiltHandles
+
 
 Place = tuple[float, float]
 

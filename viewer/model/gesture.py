@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from viewer.model.app_state import AppState
 from viewer.model.depth import end_stroke
 from viewer.model.inspection import release_divider
-from viewer.model.state.app_state import AppState
 
 
 def end_gesture(state: AppState) -> AppState:

@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import wraps
-from typing import Concatenate, ParamSpec
+from typing import TYPE_CHECKING, Concatenate, ParamSpec
 
 from iibr_core.beyond.optics import Optics
-from viewer.model.state.app_state import AppState, Edit, History
-from viewer.model.state.viewpoint import Motion
+from iibr_core.scenes.scene import AS_FOUND, DepthSettings
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+@dataclass(frozen=True)
+class Edit:
+    """The part of the state that undo restores."""
+
+    optics: Optics
+    depth_strength: float
+    depth: DepthSettings = AS_FOUND
+
+
+@dataclass(frozen=True)
+class History:
+    """Edits to undo (the latest last) and to redo (the next first), in the units of the open scene.
+
+    last: kind of the latest edit. gesture: that kind while its gesture lasts, "" after: more edits of this kind
+    belong to it until the pointer goes down or up.
+    """
+
+    past: tuple[Edit, ...] = ()
+    future: tuple[Edit, ...] = ()
+    last: str = ""
+    gesture: str = ""
+
 
 MAX_EDITS = 200
 """Number of edits that can be undone."""
@@ -79,6 +105,6 @@ def _restore(state: AppState, edit: Edit, history: History) -> AppState:
         depth_strength=edit.depth_strength,
         depth=edit.depth,
         generation=state.generation + 1 if restarts else state.generation,
-        motion=Motion(speed=state.motion.speed),
+        motion=state.motion.stopped,
         history=history,
     )

@@ -3,17 +3,75 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.action import Setter, setter
 from viewer.model.layout import Beside
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Comparison, OverlayKind, Probe, ViewIndex
-from viewer.model.state.notices import Notice
+from viewer.model.messages import Notice, notify
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+OverlayKind = Literal["disparity", "entropy", "inpainted"]
+OVERLAYS: tuple[OverlayKind, ...] = ("disparity", "entropy", "inpainted")
+Comparison = Literal["photo", "snapshot"]
+COMPARISONS: tuple[Comparison, ...] = ("photo", "snapshot")
+ViewIndex = tuple[int, int]
+"""(row, column) in a grid of views."""
+Origin = Literal["photo", "generated", "inpainted", "from disk"]
+"""Source of a pixel; "from disk": a light field that was read."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Values at one pixel of the picture. rgb: as drawn, sRGB bytes."""
+
+    rgb: tuple[int, int, int]
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """Settings and findings of inspection.
+
+    opacity: of the overlay, 0..1. divider: position of the line between compared images, 0..1 from the left;
+    divider_taken: whether it is dragged. place: pixel (x, y) pointed at last. probe: values under the pointer.
+    snapshot: state of the lens to compare with.
+    """
+
+    shows_epis: bool = False
+    shows_views: bool = False
+    shows_values: bool = False
+    overlay: OverlayKind | None = None
+    opacity: float = 0.75
+    comparison: Comparison | None = None
+    divider: float = 0.5
+    divider_taken: bool = False
+    place: tuple[float, float] | None = None
+    probe: Probe | None = None
+    snapshot: Optics | None = None
+
+    @property
+    def for_next_scene(self) -> Inspection:
+        """The same settings without the findings of the present scene."""
+        comparison: Comparison | None = "photo" if self.comparison == "photo" else None
+        return replace(self, comparison=comparison, divider_taken=False, place=None, probe=None, snapshot=None)
+
+
+@dataclass(frozen=True)
+class Hover:
+    """Pointer in the picture: its place in pixels, and the disparity there, None if it is not known."""
+
+    x_px: float
+    y_px: float
+    disparity: float | None
+
 
 DIVIDER_MARGIN = 0.02
 """Smallest distance of the divider from the picture's borders, as a share of its width."""
@@ -44,8 +102,6 @@ class InspectionTextures:
 
 
 NO_INSPECTION_TEXTURES = InspectionTextures()
-
-
 show_epis: Setter[bool] = setter("inspection.shows_epis")
 show_views: Setter[bool] = setter("inspection.shows_views")
 show_values: Setter[bool] = setter("inspection.shows_values")

@@ -10,7 +10,19 @@ from typing import NamedTuple
 
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.state.viewpoint import Zoom
+
+
+@dataclass(frozen=True)
+class Zoom:
+    """A visible part of the picture.
+
+    scale: pixels of the screen per pixel of the photo at its own size. centre: the point of the picture, (x, y) from 0
+    to 1, that lies in the middle of the available space, as far as the picture fills that.
+    """
+
+    scale: float
+    centre: tuple[float, float] = (0.5, 0.5)
+
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
 """Colour behind the picture in the dark theme, 0..1."""

@@ -6,22 +6,48 @@ Without a scene, or with numbers that are not finite, they change nothing; other
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from iibr_core.beyond.optics import ApertureShape, Optics
-from iibr_core.gloss.settings import MAX_STROKE_POINTS, STROKE_RADIUS_LIMITS, Gloss, GlossStroke
+from iibr_core.gloss.settings import MAX_STROKE_POINTS, STROKE_RADIUS_LIMITS, Gloss, GlossStroke, GlossSurface
 from iibr_core.scenes.lens_limits import clamp, clamp_optics, first_aperture, is_finite
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model import focal_plane
 from viewer.model.action import Setter
 from viewer.model.history import record_edit, undoable
-from viewer.model.presets import preset_optics, subject_disparity
-from viewer.model.state.app_state import AppState
-from viewer.model.state.lens import GlossBrush, PresetName, TiltHandles
-from viewer.model.state.viewpoint import Motion
+from viewer.model.presets import PresetName, preset_optics, subject_disparity
 from viewer.model.stroke_path import longer_path
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+FIRST_GLOSS = Gloss(GlossSurface(farthest=0.5))
+"""Gloss that the panel's switch begins with: the nearer half of the scene."""
+
+
+@dataclass(frozen=True)
+class TiltHandles:
+    """Two places that the sharp plane runs through, (x, y) from -1 to 1 across the picture, y down.
+
+    taken: index of the handle that is being dragged.
+    """
+
+    first: tuple[float, float] = (-0.5, 0.4)
+    second: tuple[float, float] = (0.5, -0.4)
+    taken: int | None = None
+
+
+@dataclass(frozen=True)
+class GlossBrush:
+    """The brush that marks the glossy surface, or erases a part of it, while it is on. radius: see `GlossStroke`."""
+
+    radius: float = 0.04
+    erases: bool = False
+    is_on: bool = False
+
 
 DEPTH_STRENGTH_LIMIT = 4.0
 
@@ -46,7 +72,7 @@ def _lens_setter(name: str) -> Setter[Any]:
 
 def _still(state: AppState) -> AppState:
     """Return the state without a motion of the viewpoint."""
-    return replace(state, motion=Motion(speed=state.motion.speed))
+    return replace(state, motion=state.motion.stopped)
 
 
 def _without_rack(state: AppState) -> AppState:

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+from iibr_core.beyond.optics import Optics
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
+from iibr_core.scenes.scene import Source
 from viewer.model import folder
+from viewer.model.app_state import AppState
 from viewer.model.history import undoable
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState
-from viewer.model.state.look import Look
-from viewer.model.state.notices import Notice
+from viewer.model.messages import Notice, notify
+
+
+@dataclass(frozen=True)
+class Look:
+    """A look that was copied. aperture_share: of the widest aperture; range_share: of all depth, for the sharp range.
+
+    tone: clips, gamma and inversion of the depth, without strokes. wanted_for: photo that is being opened to have it.
+    """
+
+    optics: Optics
+    aperture_share: float
+    range_share: float
+    tone: DepthEdits
+    depth_strength: float
+    wanted_for: Source | None = None
+
 
 COPIED = "Copied the look. Ctrl+Shift+V gives it to another photo."
 NO_LOOK = "There is no look to paste. Copy one first (Ctrl+Shift+C)."

@@ -17,19 +17,16 @@ from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source, source_with_depth
 from iibr_core.types import InputError
 from viewer.model.action import Setter, setter
+from viewer.model.app_state import AppState
 from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, with_focus_of
 from viewer.model.demo_photo import is_ours
 from viewer.model.depth_models import keep_choice, offered_model
 from viewer.model.focal_plane import focus_on
-from viewer.model.history import map_optics, undoable
-from viewer.model.messages import MAX_NOTICES, notify
+from viewer.model.history import History, map_optics, undoable
+from viewer.model.messages import MAX_NOTICES, Notice, notify
 from viewer.model.remedies import DEPTH_COMMANDS
-from viewer.model.state.app_state import AppState, History
-from viewer.model.state.folder import PhotoFacts
-from viewer.model.state.notices import Notice
-from viewer.model.state.saving import SavedSettings
-from viewer.model.state.tasks import FocusTask, PlainTask
-from viewer.model.state.viewpoint import Motion
+from viewer.model.saving import SavedSettings
+from viewer.model.tasks import FocusTask, PlainTask
 
 MAX_RECENT = 8
 RESTORED = "Restored as you left it. Ctrl+Z resets."
@@ -175,8 +172,6 @@ def focus_again(state: AppState, place: tuple[float, float], disparity: float) -
     return replace(state, optics=optics, chosen_focus=optics.focus_disparity, focused_at=place)
 
 
-set_facts: Setter[PhotoFacts] = setter("facts")
-"""Show the facts that a photo's file states."""
 set_existing_recent: Setter[tuple[str, ...]] = setter("existing_recent")
 """Offer those recent files that exist."""
 
@@ -215,7 +210,7 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
         notices=tuple(notice for notice in state.notices if notice.is_result),
         history=History(),
         inspection=found if is_step else replace(found, overlay=None),
-        motion=Motion(speed=state.motion.speed),
+        motion=state.motion.stopped,
         recent=with_recent(recent, scene.source.path),
         folder=state.folder if state.folder is not None and state.folder.path == folder else None,
         depth=DepthSettings(scene.source.depth.refine),
@@ -256,7 +251,7 @@ def _with_settings(state: AppState, settings: SavedSettings) -> AppState:
         return state
     optics = clamp_optics(settings.optics_at(state.scene.width), state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
-    return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
+    return replace(state, optics=optics, notices=notices, motion=state.motion.stopped)
 
 
 def _carried_focus(focus: float | None, optics: Optics, carried: Callable[[Optics], Optics]) -> float | None:

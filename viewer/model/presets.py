@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import isclose
+from typing import TYPE_CHECKING, Literal
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.scenes.lens_limits import aperture_of_disc, clamp_optics, focus_span
 from iibr_core.scenes.scene import Scene
-from viewer.model.state.app_state import AppState
-from viewer.model.state.lens import PRESETS, PresetName
 
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+PresetName = Literal["portrait", "macro", "everything sharp"]
+PRESETS: tuple[PresetName, ...] = ("portrait", "macro", "everything sharp")
 PORTRAIT_DISC, MACRO_DISC = 0.05, 0.08
 """Disc of the farthest background with the nearest in focus, as a share of the picture's width."""
 PORTRAIT_RANGE = 0.1

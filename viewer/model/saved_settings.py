@@ -28,7 +28,7 @@ from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
-from viewer.model.state.saving import SavedSettings
+from viewer.model.saving import SavedSettings
 
 FORMAT = 1
 MAX_CHARACTERS = 16_000_000

@@ -3,20 +3,116 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
-from typing import TypeVar
+from typing import Literal, TypeVar
 
-from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
-from iibr_core.scenes.scene import Scene
+from iibr_core.beyond.optics import Optics
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.exports.kinds import DEFAULT_OPTIONS, EXPORTS, ExportKind, ExportOptions, Purpose, export_path
+from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
+from viewer.model.app_state import AppState
 from viewer.model.demo_photo import is_ours
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import ExportPrompt, FinishedFile, JobProgress, Saved, SavePrompt
-from viewer.model.state.saving import SavedSettings
+from viewer.model.messages import Notice, notify
+
+Saved = Literal["picture", "map"]
+
+
+@dataclass(frozen=True)
+class SavePrompt:
+    """The prompt to save the picture or its disparity map.
+
+    already_there: whether the file exists. problem: reason why nothing can be saved there, "" without one.
+    """
+
+    path: str
+    size_px: ScreenSize
+    already_there: bool = False
+    what: Saved = "picture"
+    problem: str = ""
+    form: PictureFormat = USUAL_FORM
+
+
+@dataclass(frozen=True)
+class ExportPrompt:
+    """The prompt of an export.
+
+    kind: name of its kind. already_there: whether the file exists. problem: reason why it cannot be exported.
+    """
+
+    kind: str
+    path: str
+    options: ExportOptions = DEFAULT_OPTIONS
+    already_there: bool = False
+    problem: str = ""
+
+
+JobKind = Literal["picture", "map", "copy", "export"]
+WAITING_FOR_VIEWS = "waiting for the views"
+WRITING = "writing the file"
+STOPPING = "stopping"
+
+
+@dataclass(frozen=True)
+class JobProgress:
+    """A job that waits or runs.
+
+    name: of its file or folder. doing: its present step, "" while it waits for its turn. done: share of this step,
+    0..1. left_s: seconds that the step still takes, None if not known.
+    """
+
+    id: int
+    kind: JobKind
+    name: str
+    doing: str = ""
+    done: float = 0.0
+    left_s: float | None = None
+
+    @property
+    def can_be_cancelled(self) -> bool:
+        """Whether it has not come to writing its file."""
+        return self.doing not in (WRITING, STOPPING)
+
+
+@dataclass(frozen=True)
+class FinishedFile:
+    """A picture, map or export that was written or failed. prompt: asks for the same again. problem: why it failed."""
+
+    path: str
+    prompt: ExportPrompt | SavePrompt
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class SavedSettings:
+    """Settings with which a saved picture was taken.
+
+    source: the decisions about it, without paths. size_px: (width, height). depth_edits: of the photo's disparity.
+    unknown_fields: names of stored fields that this version does not know. has_model_depth: whether a model estimated
+    the depth that the focus refers to. view_width: of the views, in whose pixels the optics are; None in older
+    pictures. focused_at: place in focus, see `focal_plane`, None if none was clicked. depth_model: name or path of the
+    model; only sessions know it.
+    """
+
+    optics: Optics
+    depth_strength: float
+    source: Source
+    size_px: ScreenSize
+    depth_edits: DepthEdits = UNEDITED
+    unknown_fields: tuple[str, ...] = ()
+    has_model_depth: bool = False
+    view_width: int | None = None
+    focused_at: tuple[float, float] | None = None
+    depth_model: str = ""
+
+    def optics_at(self, view_width: int) -> Optics:
+        """Return the optics with the same focus among views of this width."""
+        return self.optics.with_focus_scaled(view_width / (self.view_width or view_width))
+
 
 MAX_FILES = 12
 """Number of saved and exported files in the list."""

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from iibr_core.depth.editing.edits import MAX_PATCHES, MAX_POINTS, BrushTool, Patch, Stroke
 from viewer.model import lens
+from viewer.model.app_state import AppState
+from viewer.model.depth import Brush
 from viewer.model.history import record_edit, undoable
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import Brush, Selection
 from viewer.model.stroke_path import longer_path
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A surface that was clicked or painted. place: (x, y) as shares of the photo's width and height.
+
+    patches: see `Stroke`. is_painted: whether only they count, not the surface at the place.
+    range_px: (far, near) disparity of the surface, in px per view step; None until the surface was found.
+    """
+
+    place: tuple[float, float]
+    patches: tuple[Patch, ...] = ()
+    is_painted: bool = False
+    range_px: tuple[float, float] | None = None
+
 
 MOVE_SHARE = 0.1
 """Step by which a surface is moved, as a share of the range of depth."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -17,10 +18,67 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from viewer.model.action import Setter, setter
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.stereo import Monitor, Stereo, StereoMode, Weave
+from viewer.model.messages import Notice, notify
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+StereoMode = Literal["sbs", "half-sbs", "top-bottom", "rows", "columns", "checkerboard", "anaglyph", "cross-eyed"]
+STEREO_MODES: tuple[StereoMode, ...] = get_args(StereoMode)
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """A monitor by name, its place and its size in screen units. width_mm: 0 if it does not state that."""
+
+    name: str
+    x: int
+    y: int
+    width: int
+    height: int
+    width_mm: int = 0
+
+    @property
+    def words(self) -> str:
+        """The monitor for people."""
+        return f"{self.name}, {self.width} x {self.height} at {self.x}, {self.y}"
+
+
+@dataclass(frozen=True)
+class Stereo:
+    """The stereo picture of the open scene.
+
+    monitor: monitor that it fills; None for the window's. eyes: distance of the eyes in view steps, None for a
+    comfortable one. screen: disparity that lies in the plane of the screen, px per view step. display: the lenticular
+    display that shows it; None for both eyes' pictures.
+    """
+
+    is_shown: bool = False
+    monitor: Monitor | None = None
+    eyes: float | None = None
+    screen: float = 0.0
+    display: Calibration | None = None
+
+    @property
+    def fills_window(self) -> bool:
+        """Whether the window itself shows it."""
+        return self.is_shown and self.monitor is None
+
+
+@dataclass(frozen=True)
+class Weave:
+    """Pictures of one size from several viewpoints, the leftmost first, and how they are woven into one for a screen.
+
+    arrangement: that of both eyes' pictures, or a lenticular display. size_px: of the screen. frame_px: room of each
+    picture, which lies in the middle of it, on the screen; on a lenticular display rooms are stretched over the screen.
+    """
+
+    eyes: tuple[RenderSettings, ...]
+    arrangement: StereoMode | Calibration
+    size_px: ScreenSize
+    frame_px: ScreenSize
+
 
 MAX_PARALLAX = 0.03
 """Largest parallax that eyes bear, as a share of the picture's width."""

@@ -14,14 +14,31 @@ import re
 import struct
 from dataclasses import dataclass, replace
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.lens_limits import clamp, clamp_eye, eye_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError, ViewOffset
 from viewer.model.action import Setter, setter
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.viewpoint import Tracking
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice, notify
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """A viewpoint that follows the head. Places are right + 1j * down, in cm.
+
+    address: where packets arrive, as `udp:HOST:PORT`. head: its newest place; centre: the place for the photo's own
+    viewpoint; None before the first. eye: viewpoint that the head led to last. latency_ms: from packets to pictures on
+    the screen. is_receiving: whether poses arrive.
+    """
+
+    address: str
+    head: complex | None = None
+    centre: complex | None = None
+    eye: ViewOffset = CENTRE
+    latency_ms: float = 0.0
+    is_receiving: bool = True
+
 
 POSE = struct.Struct("<6d")
 MAX_NUMBER = 1000.0

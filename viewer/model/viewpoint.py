@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.loops import LoopKind, ease, point_on_loop
@@ -10,10 +11,66 @@ from iibr_core.scenes.lens_limits import clamp, clamp_optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.action import Setter, setter
 from viewer.model.history import record_edit
-from viewer.model.messages import notify
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera, Motion, MotionKind, Zoom
+from viewer.model.layout import Zoom
+from viewer.model.messages import Notice, notify
+
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+
+
+MotionKind = LoopKind | Literal["home", "rack"]
+"""home: a glide to the middle. rack: a glide of the focus from one surface to another."""
+MAX_ASIDE = 0.3
+"""Largest turn of the free camera to each side, in halves of the picture: 15 % of the view lies beyond the photo."""
+FORWARD_LIMITS = -0.1, 0.6
+"""Farthest step of the free camera back and forward, in distances of the nearest surface."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A viewpoint that moves by itself.
+
+    kind: None at rest. turns: progress on the path since it began at the viewpoint `start` (and its dolly). rack: first
+    and last focus disparity of a rack. ticked_s: clock at the last step, None before the first. speed: turns per
+    second; it and is_paused outlast a change of kind.
+    """
+
+    kind: MotionKind | None = None
+    turns: float = 0.0
+    ticked_s: float | None = None
+    start: ViewOffset = CENTRE
+    start_dolly: float = 0.0
+    rack: tuple[float, float] = (0.0, 0.0)
+    speed: float = 0.25
+    is_paused: bool = False
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the picture changes without input."""
+        return self.kind is not None and not self.is_paused
+
+    @property
+    def stopped(self) -> Motion:
+        """No motion; the next has the same speed."""
+        return Motion(speed=self.speed)
+
+
+@dataclass(frozen=True)
+class FreeCamera:
+    """Pose of the camera, relative to the photo's.
+
+    right, down: the turn; 1 looks at what was at the picture's border. forward: in distances of the nearest surface.
+    """
+
+    right: float = 0.0
+    down: float = 0.0
+    forward: float = 0.0
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether the camera has reached a limit."""
+        return max(abs(self.right), abs(self.down)) >= MAX_ASIDE or self.forward in FORWARD_LIMITS
+
 
 SPEED_LIMITS = 0.05, 1.0
 """Slowest and fastest motion, in turns per second."""

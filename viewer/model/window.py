@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.action import Setter, setter
+from viewer.model.app_state import AppState
 from viewer.model.inspection import beside_of
 from viewer.model.layout import Layout, layout_of
-from viewer.model.state.app_state import AppState, DrawReport
+
+
+@dataclass(frozen=True)
+class DrawReport:
+    """Report of the last drawing: samples drawn so far, samples of the converged picture, and time in milliseconds.
+
+    is_draft: whether the picture is coarser than the screen.
+    """
+
+    samples: int = 0
+    samples_converged: int = 0
+    draw_ms: float = 0.0
+    is_draft: bool = False
 
 
 def set_fullscreen(state: AppState, is_fullscreen: bool) -> AppState:

@@ -12,11 +12,12 @@ from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, source_beside
 from viewer.model import messages, opening, preferences
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
+from viewer.model.preferences import PARENT_SECTION, SECTIONS, Section, is_seen_open
 from viewer.model.remedies import words_of
-from viewer.model.state.app_state import AppState, DrawReport
-from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Section, is_seen_open
+from viewer.model.window import DrawReport
 from viewer.ui.sections import (
     depth_section,
     essentials,
@@ -222,7 +223,7 @@ def _scene(state: AppState, scene: Scene) -> list[Action]:
     quiet(progress_text(state.progress) or "No views asked for.")
     quiet("" if state.report is None else report_text(state.report, is_final(state)))
     gap()
-    facts = state.facts.facts if state.facts.path == scene.source.path else ()
+    facts = state.facts.facts if state.facts and state.facts.path == scene.source.path else ()
     width, height = scene.own_size or scene.size
     shown = "" if (width, height) == scene.size else f", shown at {scene.width} x {scene.height}"
     size = ("Size", f"{width} x {height}{shown}")

@@ -8,10 +8,10 @@ from types import MappingProxyType
 from imgui_bundle import imgui
 
 from viewer.model.action import Action
+from viewer.model.app_state import AppState
+from viewer.model.folder import Thumbnail
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import Thumbnail
 from viewer.ui.overlays.chips import chips, panel_handle
 from viewer.ui.overlays.filmstrip import filmstrip
 from viewer.ui.overlays.inspection_overlay import draw_inspection

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.rect import Rect
 from viewer.model.layout import BACKGROUND
-from viewer.model.state.preferences import Theme
+from viewer.model.preferences import Theme
 
 FONT_SIZE = 16.0
 WORDS_ROOM = 5.0

@@ -12,7 +12,7 @@ from typing import TypeVar
 from imgui_bundle import imgui
 
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")

@@ -21,7 +21,7 @@ from tests.iibr_core.scenes import bilinear
 from tests.viewer.conftest import reduce
 from viewer.model import lens, opening
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 WALL_PX, SQUARE_PX = -0.5, 1.25
 

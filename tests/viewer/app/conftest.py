@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iibr_core.types import GridShape
-from viewer.model.state.preferences import with_sections
+from viewer.model.preferences import with_sections
 
 
 @pytest.fixture

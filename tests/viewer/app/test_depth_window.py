@@ -11,9 +11,10 @@ from iibr_core.types import ViewOffset
 from tests.viewer.conftest import FAR, NEAR
 from viewer.model import depth, gesture, lens, messages, saving
 from viewer.model.action import do
-from viewer.model.state.depth import Brush
-from viewer.model.state.preferences import SECTIONS
-from viewer.model.state.prompts import PathPrompt, SavePrompt
+from viewer.model.browsing import PathPrompt
+from viewer.model.depth import Brush
+from viewer.model.preferences import SECTIONS
+from viewer.model.saving import SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 OPEN_SECTIONS = ("depth",)

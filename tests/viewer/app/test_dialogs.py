@@ -9,7 +9,7 @@ from imgui_bundle import portable_file_dialogs
 
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.app.dialogs import ask_for_path, ask_for_place, list_folder
-from viewer.model.state.prompts import ExportPrompt, SavePrompt
+from viewer.model.saving import ExportPrompt, SavePrompt
 
 PLACE = SavePrompt("photos/one-iibr.png", ScreenSize(3, 2))
 

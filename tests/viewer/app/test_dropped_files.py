@@ -8,7 +8,7 @@ from iibr_core.types import GridShape
 from viewer.app.dropped_files import actions_from_drop
 from viewer.model import opening
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)

@@ -17,9 +17,9 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import write_scene
 from viewer.model import depth, gesture, lens, messages, opening, saving
-from viewer.model.action import ask, do
-from viewer.model.state.prompts import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
-from viewer.model.state.tasks import CancelJobTask, ExportTask, SaveTask
+from viewer.model.action import do
+from viewer.model.saving import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
+from viewer.model.tasks import CancelJobTask, ExportTask, SaveTask, ask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
 LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)

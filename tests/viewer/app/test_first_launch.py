@@ -8,9 +8,9 @@ import pytest
 
 from tests.viewer.conftest import DEADLINE_S, write_scene
 from viewer.app.preferences_store import store_preferences
-from viewer.model.state.app_state import AppState
-from viewer.model.state.preferences import Preferences
-from viewer.model.state.prompts import PathPrompt
+from viewer.model.app_state import AppState
+from viewer.model.browsing import PathPrompt
+from viewer.model.preferences import Preferences
 
 
 def test_an_empty_window_offers_to_open_a_photo_and_to_see_the_demo(open_window, no_dialogs, tmp_path):

@@ -9,10 +9,10 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.app import saving
 from viewer.model import lens
-from viewer.model.action import ask, do
-from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.tasks import SaveTask
-from viewer.model.state.viewpoint import FreeCamera
+from viewer.model.action import do
+from viewer.model.saving import SavePrompt
+from viewer.model.tasks import SaveTask, ask
+from viewer.model.viewpoint import FreeCamera
 from viewer.ui.overlays.chips import CHIP
 
 

@@ -8,7 +8,7 @@ import pytest
 from viewer.app.interruption import interruptions
 from viewer.app.main_loop import run
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 
 def interrupt_when_resized(state):

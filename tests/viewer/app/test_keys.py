@@ -12,9 +12,8 @@ from tests.viewer.conftest import reduce
 from viewer.app.keys import Keys, actions_from_keys, read_keys
 from viewer.model import history, inspection, lens, messages, saving, window
 from viewer.model.action import do
-from viewer.model.commands import BY_NAME, COMMANDS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import PalettePrompt
+from viewer.model.app_state import AppState
+from viewer.model.commands import BY_NAME, COMMANDS, PalettePrompt
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)

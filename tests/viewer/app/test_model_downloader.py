@@ -17,9 +17,9 @@ from tests.local_hub import local_hub
 from viewer.background.depth_models import OFFLINE, list_models
 from viewer.model import depth, depth_models, gesture, history, lens, opening, preferences
 from viewer.model.action import do
+from viewer.model.depth import Brush
 from viewer.model.depth_models import offered_model
 from viewer.model.focal_plane import place_of, sharp_disparity
-from viewer.model.state.depth import Brush
 
 MODEL = known_model("depth-anything-v2-small")
 GRID = GridShape(3, 3)

@@ -14,8 +14,8 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import write_scene
 from viewer.model import depth, gesture, inspection, lens, opening, selection, viewpoint
 from viewer.model.action import do
-from viewer.model.state.depth import DepthSample
-from viewer.model.state.viewpoint import Zoom
+from viewer.model.depth import DepthSample
+from viewer.model.layout import Zoom
 
 GRID = GridShape(3, 3)
 OF_THE_PROGRAM = {

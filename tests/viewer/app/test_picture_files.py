@@ -20,9 +20,9 @@ from viewer.app.saving import checked_path
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.tasks import SaveTask
+from viewer.model.app_state import AppState
+from viewer.model.saving import SavePrompt
+from viewer.model.tasks import SaveTask
 
 
 @pytest.fixture(scope="module")

@@ -17,11 +17,11 @@ from viewer.app.pointer import (
 )
 from viewer.model import inspection, lens, viewpoint
 from viewer.model.action import do
+from viewer.model.app_state import AppState
 from viewer.model.focal_plane import handle_points
-from viewer.model.layout import layout_of, pixel_at
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.lens import TiltHandles
-from viewer.model.state.viewpoint import Zoom
+from viewer.model.inspection import Hover
+from viewer.model.layout import Zoom, layout_of, pixel_at
+from viewer.model.lens import TiltHandles
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
 STATE = AppState(source=SCENE.source, scene=SCENE)

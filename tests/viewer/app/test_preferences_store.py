@@ -18,9 +18,8 @@ from viewer.app.preferences_store import (
 )
 from viewer.model import preferences, tracking
 from viewer.model.action import do
-from viewer.model.preferences import FONT_SCALE_LIMITS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.preferences import Preferences
+from viewer.model.app_state import AppState
+from viewer.model.preferences import FONT_SCALE_LIMITS, Preferences
 from viewer.model.tracking import HEAD_RANGE_LIMITS
 
 

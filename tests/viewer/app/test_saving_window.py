@@ -18,9 +18,9 @@ from viewer.app.jobs import Jobs
 from viewer.app.picture_files import export_picture, read_settings
 from viewer.app.saving import OPEN_PHOTO
 from viewer.model import lens, messages, saving
-from viewer.model.action import ask, do
-from viewer.model.state.prompts import WRITING, SavePrompt
-from viewer.model.state.tasks import PlainTask, SaveTask
+from viewer.model.action import do
+from viewer.model.saving import WRITING, SavePrompt
+from viewer.model.tasks import PlainTask, SaveTask, ask
 
 SIZE = ScreenSize(150, 100)
 LARGE = ScreenSize(1500, 1000)

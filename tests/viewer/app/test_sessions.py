@@ -20,7 +20,7 @@ from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
-from viewer.model.state.saving import SavedSettings
+from viewer.model.saving import SavedSettings
 
 ONE = GridShape(1, 1)
 RESTORED = "as you left it"

@@ -25,10 +25,10 @@ from viewer import entry
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, messages, preferences, stereo
-from viewer.model.action import ask, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES, Monitor
-from viewer.model.state.tasks import PlainTask
+from viewer.model.action import do
+from viewer.model.app_state import AppState
+from viewer.model.stereo import STEREO_MODES, Monitor
+from viewer.model.tasks import PlainTask, ask
 
 FIRST, SECOND = ScreenSize(1024, 768), ScreenSize(640, 480)
 CALIBRATION = {"pitch": 50, "slope": -7, "center": 0.2, "DPI": 300, "screenW": SECOND.width, "screenH": SECOND.height}

@@ -17,10 +17,11 @@ from viewer.app.picture_files import read_settings
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, opening
-from viewer.model.action import ask, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import ExportPrompt, PalettePrompt, SavePrompt
-from viewer.model.state.tasks import PlainTask, SaveTask
+from viewer.model.action import do
+from viewer.model.app_state import AppState
+from viewer.model.commands import PalettePrompt
+from viewer.model.saving import ExportPrompt, SavePrompt
+from viewer.model.tasks import PlainTask, SaveTask, ask
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 

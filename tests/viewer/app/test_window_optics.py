@@ -9,8 +9,8 @@ from tests.viewer.conftest import FAR, NEAR
 from viewer.model import lens, messages, preferences
 from viewer.model.action import do
 from viewer.model.focal_plane import handle_points, sharp_disparity
-from viewer.model.state.lens import TiltHandles
-from viewer.model.state.notices import Notice
+from viewer.model.lens import TiltHandles
+from viewer.model.messages import Notice
 
 
 def field_disparity(app, given):

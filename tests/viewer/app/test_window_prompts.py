@@ -11,11 +11,12 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.app.pace import NoticeClock
 from viewer.model import messages, preferences, saving
 from viewer.model.action import do
-from viewer.model.commands import BY_NAME, COMMANDS
+from viewer.model.app_state import AppState
+from viewer.model.browsing import PathPrompt
+from viewer.model.commands import BY_NAME, COMMANDS, PalettePrompt
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import RESULT_S, Notice
-from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.messages import RESULT_S, Notice
+from viewer.model.saving import ExportPrompt, SavePrompt
 from viewer.ui.overlays.path_prompt import browsed_paths
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")

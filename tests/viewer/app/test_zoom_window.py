@@ -10,7 +10,7 @@ from tests.viewer.conftest import NEAR
 from viewer.background.newest import Newest
 from viewer.model import lens, viewpoint
 from viewer.model.action import do
-from viewer.model.state.viewpoint import Zoom
+from viewer.model.layout import Zoom
 
 
 def zoom_to(viewer, zoom):

@@ -14,7 +14,7 @@ from tests.viewer.conftest import reduce, write_scene
 from viewer.background.depth_models import DepthFinder
 from viewer.model import depth_models, opening
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 DEADLINE_S = 60.0
 

@@ -21,7 +21,7 @@ from viewer.background.newest import Failed, Newest
 from viewer.background.scene_worker import PhotosFound, SceneWork, WorkReport
 from viewer.model import lens, opening
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 
 DEADLINE_S = 120.0
 VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)

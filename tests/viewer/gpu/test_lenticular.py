@@ -15,7 +15,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.weaving import Weaver
-from viewer.model.state.stereo import Weave
+from viewer.model.stereo import Weave
 
 PORTRAIT = {
     "configVersion": "1.0", "serial": "LKG-PORT-00000", "pitch": {"value": 52.5927}, "slope": {"value": -7.0835},

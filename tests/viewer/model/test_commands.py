@@ -12,13 +12,15 @@ from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import saving
 from viewer.model.action import do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME, CAMERA_STEP, COMMANDS, FONT_STEP, Chord, commands_matching, recent_commands
 from viewer.model.demo_photo import demo_photo
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.lens import PRESETS
-from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.tasks import ChooseTask
-from viewer.model.state.viewpoint import FreeCamera, Zoom
+from viewer.model.inspection import Hover
+from viewer.model.layout import Zoom
+from viewer.model.presets import PRESETS
+from viewer.model.saving import SavePrompt
+from viewer.model.tasks import ChooseTask
+from viewer.model.viewpoint import FreeCamera
 
 
 def test_names_and_chords_are_unique_and_known_to_imgui():

@@ -27,10 +27,10 @@ from viewer.model import depth, gesture, history, inspection, lens, opening, sav
 from viewer.model.action import do
 from viewer.model.carried_optics import NewDepth
 from viewer.model.commands import action_for_path
+from viewer.model.depth import Brush, DepthSample
 from viewer.model.layout import layout_of
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.saving import settings_of
-from viewer.model.state.depth import Brush, DepthSample
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
 GRID = GridShape(3, 3)

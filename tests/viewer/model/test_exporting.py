@@ -12,9 +12,17 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from tests.viewer.model.test_opening import scene_of, state_with
 from viewer.model import saving
-from viewer.model.saving import MAX_FILES, as_other_kind, first_kind, kinds_for, usual_export_path, written_path
-from viewer.model.state.depth import Selection
-from viewer.model.state.prompts import ExportPrompt, SavePrompt
+from viewer.model.saving import (
+    MAX_FILES,
+    ExportPrompt,
+    SavePrompt,
+    as_other_kind,
+    first_kind,
+    kinds_for,
+    usual_export_path,
+    written_path,
+)
+from viewer.model.selection import Selection
 
 STATE = state_with(replace(scene_of(source=Source("/photos/bike.jpg")), name="bike"))
 PLAIN = ExportOptions()

@@ -18,7 +18,7 @@ from viewer.model.focal_plane import (
     sharp_disparity,
     tilt_through,
 )
-from viewer.model.state.lens import TiltHandles
+from viewer.model.lens import TiltHandles
 
 shares = st.floats(-1, 1)
 places = st.tuples(shares, shares)

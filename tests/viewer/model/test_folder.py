@@ -10,8 +10,8 @@ from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import scene_of
 from viewer.model import folder, inspection, opening
 from viewer.model.action import do
+from viewer.model.app_state import AppState
 from viewer.model.folder import AHEAD, filmstrip_range, photos_ahead
-from viewer.model.state.app_state import AppState
 
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 

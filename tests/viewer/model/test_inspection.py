@@ -12,13 +12,12 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from viewer.model import gesture, inspection, opening
 from viewer.model.action import do
+from viewer.model.app_state import AppState
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME
-from viewer.model.inspection import beside_of, sheet_cells, view_at, view_near
+from viewer.model.inspection import Hover, Inspection, Probe, beside_of, sheet_cells, view_at, view_near
 from viewer.model.layout import Beside, layout_of
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Inspection, Probe
-from viewer.model.state.preferences import Preferences
+from viewer.model.preferences import Preferences
 from viewer.ui.overlays.inspection_overlay import legend_words, status_text
 from viewer.ui.overlays.reticle import hover_text
 

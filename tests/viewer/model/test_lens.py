@@ -22,13 +22,12 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import depth, gesture, history, lens, look, opening
 from viewer.model.action import do
+from viewer.model.app_state import AppState
 from viewer.model.carried_optics import carry_optics
+from viewer.model.depth import Brush
 from viewer.model.focal_plane import sharp_disparity
-from viewer.model.lens import DEPTH_STRENGTH_LIMIT
-from viewer.model.presets import active_preset
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import Brush
-from viewer.model.state.lens import FIRST_GLOSS, PRESETS, GlossBrush, TiltHandles
+from viewer.model.lens import DEPTH_STRENGTH_LIMIT, FIRST_GLOSS, GlossBrush, TiltHandles
+from viewer.model.presets import PRESETS, active_preset
 
 floats = st.floats(allow_nan=True, allow_infinity=True)
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))

@@ -15,14 +15,12 @@ from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from viewer.model import history, lens, messages, opening, saving
-from viewer.model.action import ask, do, forget_tasks
-from viewer.model.messages import MAX_NOTICES
+from viewer.model.action import do
+from viewer.model.app_state import AppState
+from viewer.model.messages import MAX_NOTICES, Notice
 from viewer.model.remedies import DEPTH_COMMANDS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import JobProgress
-from viewer.model.state.saving import SavedSettings
-from viewer.model.state.tasks import PlainTask
+from viewer.model.saving import JobProgress, SavedSettings
+from viewer.model.tasks import PlainTask, ask, forget_tasks
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)

@@ -10,7 +10,7 @@ from iibr_core.scenes.f_numbers import ASSUMED_DISTANCE_M, equivalent_f_number, 
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.types import GridShape
 from tests.viewer.model.test_opening import plan_of, scene_of
-from viewer.model.state.app_state import Hover
+from viewer.model.inspection import Hover
 from viewer.model.units import (
     disparity_at,
     disparity_at_percent,

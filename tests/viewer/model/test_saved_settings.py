@@ -28,7 +28,7 @@ from viewer.model.saved_settings import (
     settings_text,
     source_like,
 )
-from viewer.model.state.saving import SavedSettings
+from viewer.model.saving import SavedSettings
 
 numbers = st.floats(-1e3, 1e3)
 masks = st.builds(lambda n: ApertureMask("ünïcode “mask”.png", 2, n, bytes([255] * 2 * n)), st.integers(1, 64))

@@ -14,8 +14,8 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import stereo
-from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES, Monitor, Stereo
+from viewer.model.app_state import AppState
+from viewer.model.stereo import STEREO_MODES, Monitor, Stereo
 
 SCENE = Scene(Source("a.png"), "a", 600, 400, GridShape(3, 9), (-2.0, 4.0), "a.pfm")
 PANEL, TELEVISION = Monitor("eDP-1", 0, 0, 1920, 1080), Monitor("HDMI-1", 1920, 0, 3840, 2160)

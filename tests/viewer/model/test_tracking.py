@@ -17,9 +17,9 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_opening import grids, scene_of, state_with
 from viewer.model import gesture, history, lens, opening, tracking, viewpoint
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.viewpoint import FreeCamera
+from viewer.model.app_state import AppState
 from viewer.model.tracking import HEAD_RANGE_LIMITS, address_of, eye_of, head_in, offset_of, smooth
+from viewer.model.viewpoint import FreeCamera
 
 FIVE = scene_of(GridShape(5, 5))
 

@@ -17,9 +17,8 @@ from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import gesture, history, lens, opening, saving, viewpoint
 from viewer.model.action import do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
-from viewer.model.viewpoint import HOME_S, MAX_STEP_S, RACK_S, SPEED_LIMITS
+from viewer.model.app_state import AppState
+from viewer.model.viewpoint import FORWARD_LIMITS, HOME_S, MAX_ASIDE, MAX_STEP_S, RACK_S, SPEED_LIMITS, FreeCamera
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
 NINE = GridShape(9, 9)

@@ -11,9 +11,8 @@ from iibr_core.types import GridShape
 from tests.viewer.conftest import reduce
 from viewer.model import opening, viewpoint
 from viewer.model.action import do
-from viewer.model.layout import MAX_ZOOM, Beside, layout_of, pixel_at
-from viewer.model.state.app_state import AppState
-from viewer.model.state.viewpoint import Zoom
+from viewer.model.app_state import AppState
+from viewer.model.layout import MAX_ZOOM, Beside, Zoom, layout_of, pixel_at
 
 WINDOW, SIZE, OWN_WIDTH = ScreenSize(1280, 800), ScreenSize(600, 400), 4800
 SCENE = Scene(Source("photo.png"), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")

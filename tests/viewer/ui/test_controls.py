@@ -13,10 +13,10 @@ from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import depth, inspection, lens, messages, viewpoint
 from viewer.model.action import do
-from viewer.model.state.depth import Brush, DepthSample
-from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
-from viewer.model.state.preferences import Preferences, with_sections
-from viewer.model.state.prompts import ExportPrompt, SavePrompt
+from viewer.model.depth import Brush, DepthSample
+from viewer.model.lens import FIRST_GLOSS, GlossBrush
+from viewer.model.preferences import Preferences, with_sections
+from viewer.model.saving import ExportPrompt, SavePrompt
 
 NINE = GridShape(9, 9)
 SCENE = scene_of(NINE, plan=plan_of(NINE), focal_px=50.0)

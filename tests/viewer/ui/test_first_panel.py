@@ -11,9 +11,9 @@ from tests.viewer.conftest import reduce
 from tests.viewer.ui.conftest import CONTROLS
 from viewer.model import preferences, window
 from viewer.model.action import do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
-from viewer.model.state.app_state import AppState
-from viewer.model.state.preferences import Preferences, is_seen_open, with_sections
+from viewer.model.preferences import Preferences, is_seen_open, with_sections
 from viewer.ui.sections.depth_section import depth_source
 
 WINDOW = ScreenSize(1280, 800)

@@ -13,13 +13,10 @@ from tests.viewer.conftest import HEIGHT, NEAR, WIDTH
 from viewer.display.inspection_view import MASK_COLORS
 from viewer.model import depth, inspection, lens, messages, viewpoint
 from viewer.model.action import do
-from viewer.model.inspection import beside_of, sheet_cells
-from viewer.model.layout import layout_of
-from viewer.model.state.app_state import Hover
-from viewer.model.state.depth import Brush, DepthSample
-from viewer.model.state.inspection import OVERLAYS
-from viewer.model.state.notices import Notice
-from viewer.model.state.viewpoint import Zoom
+from viewer.model.depth import Brush, DepthSample
+from viewer.model.inspection import OVERLAYS, Hover, beside_of, sheet_cells
+from viewer.model.layout import Zoom, layout_of
+from viewer.model.messages import Notice
 from viewer.model.window import layout_for
 from viewer.ui.style import DARK
 

@@ -14,13 +14,15 @@ from tests.viewer.ui.conftest import WORDS_INSIDE
 from viewer.background.depth_models import list_models
 from viewer.model import depth, depth_models, inspection, lens, messages, preferences, viewpoint
 from viewer.model.action import do
+from viewer.model.app_state import AppState
+from viewer.model.browsing import Listing, PathPrompt
+from viewer.model.commands import PalettePrompt
+from viewer.model.depth import Brush, DepthSample
+from viewer.model.depth_models import ModelsPrompt
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import Brush, DepthSample
-from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
-from viewer.model.state.preferences import SECTIONS
-from viewer.model.state.prompts import ExportPrompt, JobProgress, Listing, PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.lens import FIRST_GLOSS, GlossBrush
+from viewer.model.preferences import SECTIONS
+from viewer.model.saving import ExportPrompt, JobProgress, SavePrompt
 from viewer.ui.style import Look, apply_style, palette_of
 
 WINDOW, SMALL_WINDOW = ScreenSize(1280, 800), ScreenSize(400, 300)

@@ -12,12 +12,16 @@ from iibr_core.types import GridShape
 from tests.viewer.conftest import reduce
 from viewer.model import depth, inspection, lens, messages, opening, preferences, saving, window
 from viewer.model.action import do
+from viewer.model.app_state import AppState
+from viewer.model.browsing import PathPrompt
+from viewer.model.commands import PalettePrompt
+from viewer.model.inspection import Hover
 from viewer.model.layout import PANEL_WIDTH
+from viewer.model.messages import Notice
+from viewer.model.preferences import SECTIONS, with_sections
 from viewer.model.remedies import BETTER_DEPTH
-from viewer.model.state.app_state import AppState, DrawReport, Hover
-from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SECTIONS, with_sections
-from viewer.model.state.prompts import WRITING, JobProgress, PalettePrompt, PathPrompt
+from viewer.model.saving import WRITING, JobProgress
+from viewer.model.window import DrawReport
 from viewer.ui.overlays.notice_corner import job_text
 from viewer.ui.panel import is_final, progress_text, report_text, size_text
 from viewer.ui.style import DARK, LIGHT

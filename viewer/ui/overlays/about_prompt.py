@@ -5,8 +5,8 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.model import messages
-from viewer.model.action import Action, ask, do
-from viewer.model.state.tasks import ShowFileTask
+from viewer.model.action import Action, do
+from viewer.model.tasks import ShowFileTask, ask
 from viewer.ui.overlays.prompt_rows import button_rows
 from viewer.ui.widgets import gap, quiet
 from viewer.version import program_commit, program_licence, program_pages, program_version

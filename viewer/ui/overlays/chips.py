@@ -8,8 +8,8 @@ from imgui_bundle import imgui
 from iibr_core.scenes.rect import Rect
 from viewer.model import depth_models, tracking, viewpoint, window
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import AppState
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS
 from viewer.ui.style import DARK, draw_words
 from viewer.ui.widgets import scale, tooltip

@@ -19,10 +19,10 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, InputError
 from viewer.model import messages, saving
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.preferences import is_seen_open
-from viewer.model.state.prompts import ExportPrompt
-from viewer.model.state.tasks import ExportTask
+from viewer.model.app_state import AppState
+from viewer.model.preferences import is_seen_open
+from viewer.model.saving import ExportPrompt
+from viewer.model.tasks import ExportTask
 from viewer.ui.overlays.prompt_rows import WIDTH_FIELD, choice_row, place_actions, place_row, size_row, text_field
 from viewer.ui.widgets import checkbox, choices, gap, label, percent_slider, quiet, scale, slider
 

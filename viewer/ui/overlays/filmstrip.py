@@ -10,9 +10,9 @@ from imgui_bundle import imgui
 from iibr_core.scenes.rect import Rect
 from viewer.model import folder, look
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.folder import Thumbnail
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import Thumbnail
 from viewer.ui.style import Palette, corners, pack_color, palette_of
 from viewer.ui.widgets import scale, tooltip
 

@@ -9,11 +9,10 @@ from imgui_bundle import imgui
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
+from viewer.model.app_state import AppState
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.inspection import InspectionTextures, sheet_cells, view_near
+from viewer.model.inspection import Hover, InspectionTextures, Probe, sheet_cells, view_near
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Probe
 from viewer.model.units import metres, metres_text
 from viewer.ui.overlays.chips import has_guess_badge
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text

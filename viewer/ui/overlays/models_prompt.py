@@ -7,10 +7,10 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from viewer.model import depth_models, messages
-from viewer.model.action import Action, ask, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import ModelOffer, ModelsPrompt
-from viewer.model.state.tasks import ChooseTask
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.depth_models import ModelOffer, ModelsPrompt
+from viewer.model.tasks import ChooseTask, ask
 from viewer.ui.overlays.prompt_rows import button_rows
 from viewer.ui.widgets import gap, quiet
 

@@ -9,14 +9,14 @@ from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
 from viewer.model import depth_models, messages, opening, viewpoint
-from viewer.model.action import Action, ask, do
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
+from viewer.model.depth_models import ModelOffer
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import ModelOffer
-from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import WRITING, JobKind, JobProgress
-from viewer.model.state.tasks import CancelJobTask, ChooseTask, PlainTask
+from viewer.model.messages import Notice
+from viewer.model.saving import WRITING, JobKind, JobProgress
+from viewer.model.tasks import CancelJobTask, ChooseTask, PlainTask, ask
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, colored, gap, quiet, scale, tooltip

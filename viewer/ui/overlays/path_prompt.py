@@ -11,11 +11,11 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.rect import Rect
 from viewer.model import browsing
-from viewer.model.action import Action, ask, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import Thumbnail
-from viewer.model.state.prompts import ChoiceOf, PathPrompt
-from viewer.model.state.tasks import TakePathTask
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.browsing import PathPrompt
+from viewer.model.folder import Thumbnail
+from viewer.model.tasks import ChoiceOf, TakePathTask, ask
 from viewer.ui.overlays import prompt_rows as rows
 from viewer.ui.overlays.filmstrip import CELL_ASPECT, GAP, photo_cell
 from viewer.ui.style import palette_of

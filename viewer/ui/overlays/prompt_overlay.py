@@ -9,20 +9,13 @@ from imgui_bundle import imgui
 
 from viewer.model import messages, saving
 from viewer.model.action import Action, do
-from viewer.model.commands import COMMANDS, Command, commands_matching, recent_commands
+from viewer.model.app_state import AppState, Prompt
+from viewer.model.browsing import PathPrompt
+from viewer.model.commands import COMMANDS, Command, PalettePrompt, commands_matching, recent_commands
+from viewer.model.depth_models import ModelsPrompt
+from viewer.model.folder import Thumbnail
 from viewer.model.layout import PANEL_WIDTH, Layout
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.folder import Thumbnail
-from viewer.model.state.prompts import (
-    ExportPrompt,
-    FinishedFile,
-    JobProgress,
-    PalettePrompt,
-    PathPrompt,
-    Prompt,
-    SavePrompt,
-)
+from viewer.model.saving import ExportPrompt, FinishedFile, JobProgress, SavePrompt
 from viewer.ui.overlays import prompt_rows as rows
 from viewer.ui.overlays.about_prompt import about_prompt
 from viewer.ui.overlays.export_prompt import export_prompt

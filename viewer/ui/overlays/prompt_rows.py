@@ -11,10 +11,10 @@ from typing import NamedTuple, TypeVar
 from imgui_bundle import imgui
 
 from viewer.model import messages
-from viewer.model.action import Action, ask, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import ExportPrompt, Prompt, SavePrompt
-from viewer.model.state.tasks import ChoosePlaceTask, ExportTask, SaveTask, ShowFileTask
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState, Prompt
+from viewer.model.saving import ExportPrompt, SavePrompt
+from viewer.model.tasks import ChoosePlaceTask, ExportTask, SaveTask, ShowFileTask, ask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, colored, combo, gap, label, scale
 

@@ -11,12 +11,13 @@ from iibr_core.depth.editing.edits import DEPTH_TOOLS
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
+from viewer.model.app_state import AppState
+from viewer.model.depth import Tool
 from viewer.model.focal_plane import handle_points, place_of, sharp_disparity
+from viewer.model.inspection import Hover
 from viewer.model.layout import Layout
-from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.depth import Tool
-from viewer.model.state.lens import TiltHandles
-from viewer.model.state.preferences import Units
+from viewer.model.lens import TiltHandles
+from viewer.model.preferences import Units
 from viewer.model.units import far_percent, metres, metres_text, relative_distance
 from viewer.ui.style import DARK, WORDS_ROOM, Color, corners, draw_words, pack_color
 

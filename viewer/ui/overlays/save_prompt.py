@@ -14,9 +14,9 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
 from viewer.model.action import Action
-from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import SavePrompt
-from viewer.model.state.tasks import SaveTask
+from viewer.model.app_state import AppState
+from viewer.model.saving import SavePrompt
+from viewer.model.tasks import SaveTask
 from viewer.ui.overlays.prompt_rows import place_actions, place_row, size_row
 from viewer.ui.widgets import gap, label, quiet, slider
 

@@ -10,10 +10,10 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Source
 from viewer.model import opening
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
+from viewer.model.folder import Thumbnail
 from viewer.model.layout import MARGIN, Layout
-from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import Thumbnail
 from viewer.ui.overlays.filmstrip import CELL_ASPECT, GAP, photo_cell, write_in_cell
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows
 from viewer.ui.panel import progress_text

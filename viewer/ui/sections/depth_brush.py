@@ -9,9 +9,9 @@ from imgui_bundle import imgui
 from iibr_core.depth.editing.edits import DEPTH_TOOLS, FEATHER_LIMITS, RADIUS_LIMITS, TOLERANCE_LIMITS
 from viewer.model import depth, selection
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import BRUSH_WORDS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import Brush, Tool
+from viewer.model.depth import Brush, Tool
 from viewer.ui.widgets import button, choices, edit, in_row, percent_slider
 
 TOOL_TIPS: dict[Tool, str] = {

@@ -12,8 +12,8 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model import depth
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.colormap import map_color
-from viewer.model.state.app_state import AppState
 from viewer.ui.style import Palette, corners, pack_color, palette_of
 from viewer.ui.widgets import scale, tooltip
 

@@ -10,10 +10,10 @@ from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import GAMMA_LIMITS, UNEDITED
 from iibr_core.scenes.scene import Scene, source_with_depth
 from viewer.model import depth, depth_models, inspection, opening, preferences, saving
-from viewer.model.action import Action, ask, do
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.remedies import BETTER_DEPTH
-from viewer.model.state.app_state import AppState
-from viewer.model.state.tasks import ChooseTask
+from viewer.model.tasks import ChooseTask, ask
 from viewer.ui.sections.depth_brush import brush_rows, selection_rows
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import (

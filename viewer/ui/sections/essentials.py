@@ -9,10 +9,9 @@ from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, viewpoint
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.lens import DEPTH_STRENGTH_LIMIT
-from viewer.model.presets import active_preset
-from viewer.model.state.app_state import AppState
-from viewer.model.state.lens import PresetName
+from viewer.model.presets import PresetName, active_preset
 from viewer.ui.sections.lens_section import aperture_slider, focus_slider
 from viewer.ui.widgets import choices, label, slider
 

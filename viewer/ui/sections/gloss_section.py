@@ -20,8 +20,8 @@ from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
+from viewer.model.app_state import AppState
+from viewer.model.lens import FIRST_GLOSS, GlossBrush
 from viewer.ui.style import Palette, pack_color, palette_of
 from viewer.ui.widgets import button, checkbox, choice, edit, gap, in_row, percent_slider, scale, slider, tooltip
 

@@ -7,10 +7,10 @@ from imgui_bundle import imgui
 from iibr_core.scenes.scene import Scene
 from viewer.model import inspection, preferences
 from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import OVERLAY_WORDS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import Comparison, OverlayKind
-from viewer.model.state.preferences import Units
+from viewer.model.inspection import Comparison, OverlayKind
+from viewer.model.preferences import Units
 from viewer.ui.widgets import button, checkbox, choices, edit, percent_slider
 
 VIEWS = {

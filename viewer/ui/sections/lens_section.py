@@ -13,9 +13,9 @@ from iibr_core.scenes.lens_choice import TURNED
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, clamp, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, units
-from viewer.model.action import Action, ask, do
-from viewer.model.state.app_state import AppState
-from viewer.model.state.tasks import ChooseTask
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.tasks import ChooseTask, ask
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette, palette_of
 from viewer.ui.widgets import button, checkbox, choice, edit, in_row, percent_slider, quiet, scale, slider

@@ -6,11 +6,11 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Scene
 from viewer.model import stereo
-from viewer.model.action import Action, ask, do
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
 from viewer.model.commands import STEREO_WORDS
-from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES, Monitor
-from viewer.model.state.tasks import PlainTask
+from viewer.model.stereo import STEREO_MODES, Monitor
+from viewer.model.tasks import PlainTask, ask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, checkbox, colored, combo, edit, label, slider
 

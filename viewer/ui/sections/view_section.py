@@ -9,7 +9,7 @@ from iibr_core.scenes.lens_limits import dolly_limit
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, tracking, viewpoint
 from viewer.model.action import Action, do
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 from viewer.model.tracking import HEAD_RANGE_LIMITS
 from viewer.model.viewpoint import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import pad

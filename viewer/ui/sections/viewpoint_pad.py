@@ -13,7 +13,7 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model import lens
 from viewer.model.action import Action
-from viewer.model.state.app_state import AppState
+from viewer.model.app_state import AppState
 from viewer.ui.style import corners, pack_color, palette_of
 from viewer.ui.widgets import edit, scale
 

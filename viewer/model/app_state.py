@@ -1,75 +1,43 @@
 """The viewer's whole state, frozen. Everything the screen shows is a function of it.
 
-Comparing two records decides what an edit costs: a new `generation` restarts the worker, a new `Picture` draws again.
+Comparing two records decides what an edit costs: a new `generation` restarts the worker, new optics draw again.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.depth.editing.edits import Stroke
 from iibr_core.exports.loops import LOOPS
-from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
-from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.state.depth import Brush, Selection
-from viewer.model.state.depth_models import DepthModels
-from viewer.model.state.folder import PhotoFacts, PhotoFolder
-from viewer.model.state.inspection import Inspection
-from viewer.model.state.lens import GlossBrush, TiltHandles
-from viewer.model.state.look import Look
-from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import Preferences
-from viewer.model.state.prompts import ExportPrompt, FinishedFile, JobProgress, Prompt
-from viewer.model.state.stereo import Monitor, Stereo
-from viewer.model.state.tasks import Task
-from viewer.model.state.viewpoint import FreeCamera, Motion, Tracking, Zoom
+from viewer.model.depth import Brush
+from viewer.model.depth_models import DepthModels, ModelsPrompt
+from viewer.model.history import History
+from viewer.model.inspection import Hover, Inspection
+from viewer.model.layout import Zoom
+from viewer.model.lens import GlossBrush, TiltHandles
+from viewer.model.messages import Notice
+from viewer.model.preferences import Preferences
+from viewer.model.stereo import Monitor, Stereo
+from viewer.model.viewpoint import FreeCamera, Motion
 
+if TYPE_CHECKING:
+    from iibr_core.depth.editing.edits import Stroke
+    from viewer.model.browsing import PathPrompt
+    from viewer.model.commands import PalettePrompt
+    from viewer.model.folder import PhotoFacts, PhotoFolder
+    from viewer.model.look import Look
+    from viewer.model.saving import ExportPrompt, FinishedFile, JobProgress, SavePrompt
+    from viewer.model.selection import Selection
+    from viewer.model.tasks import Task
+    from viewer.model.tracking import Tracking
+    from viewer.model.window import DrawReport
 
-@dataclass(frozen=True)
-class Edit:
-    """The part of the state that undo restores."""
+PlainPrompt = Literal["help", "about", "quit", "files"]
+"""quit: whether to close although jobs are under way. files: the list of saved and exported files."""
 
-    optics: Optics
-    depth_strength: float
-    depth: DepthSettings = AS_FOUND
-
-
-@dataclass(frozen=True)
-class History:
-    """Edits to undo (the latest last) and to redo (the next first), in the units of the open scene.
-
-    last: kind of the latest edit. gesture: that kind while its gesture lasts, "" after: more edits of this kind
-    belong to it until the pointer goes down or up.
-    """
-
-    past: tuple[Edit, ...] = ()
-    future: tuple[Edit, ...] = ()
-    last: str = ""
-    gesture: str = ""
-
-
-@dataclass(frozen=True)
-class Hover:
-    """Pointer in the picture: its place in pixels, and the disparity there, None if it is not known."""
-
-    x_px: float
-    y_px: float
-    disparity: float | None
-
-
-@dataclass(frozen=True)
-class DrawReport:
-    """Report of the last drawing: samples drawn so far, samples of the converged picture, and time in milliseconds.
-
-    is_draft: whether the picture is coarser than the screen.
-    """
-
-    samples: int = 0
-    samples_converged: int = 0
-    draw_ms: float = 0.0
-    is_draft: bool = False
+Prompt: TypeAlias = "PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | PlainPrompt"
 
 
 @dataclass(frozen=True)
@@ -129,7 +97,7 @@ class AppState:
     has_dialogs: bool = False
     shown_generation: int = 0
     folder: PhotoFolder | None = None
-    facts: PhotoFacts = field(default_factory=lambda: PhotoFacts(""))
+    facts: PhotoFacts | None = None
     is_fullscreen: bool = False
     hides_panel: bool | None = None
     hid_panel: bool | None = None
@@ -146,7 +114,7 @@ class AppState:
         motion = self.motion
         if motion.kind not in LOOPS or motion.is_paused:
             return self
-        return replace(self, optics=replace(self.optics, eye=motion.start), motion=Motion(speed=motion.speed))
+        return replace(self, optics=replace(self.optics, eye=motion.start), motion=motion.stopped)
 
     @property
     def shown_optics(self) -> Optics:
@@ -168,20 +136,3 @@ class AppState:
     def with_tasks(self, *tasks: Task) -> AppState:
         """Return the state with more tasks for the outside world."""
         return replace(self, tasks=(*self.tasks, *tasks))
-
-
-@dataclass(frozen=True)
-class Picture:
-    """Everything that the picture depends on.
-
-    generation: of the scene. views_uploaded, previews: numbers of views, and of previews of edited depth and gloss, so
-    far. samples: drawn so far. part: the part of the picture that is drawn, as a share of it.
-    """
-
-    generation: int
-    views_uploaded: int
-    optics: Optics
-    size_px: ScreenSize
-    samples: int = 0
-    previews: int = 0
-    part: Rect = WHOLE

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
-from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PathPrompt, SavePrompt
+if TYPE_CHECKING:
+    from viewer.model.app_state import AppState
+    from viewer.model.browsing import PathPrompt
+    from viewer.model.saving import ExportPrompt, SavePrompt
+
+
+ChoiceOf = Literal["photo", "folder", "mask", "map", "model", "model folder"]
+"""map: a disparity map for the open photo; model: an ONNX file of a depth model."""
 
 PlainKind = Literal[
     "copy", "paste", "find display", "read mask", "list folder", "read facts", "find recent", "list models",
@@ -97,3 +104,13 @@ Task = (
     PlainTask | ChooseTask | TakePathTask | ListTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask
     | ShowFileTask | FocusTask
 )  # fmt: skip
+
+
+def ask(state: AppState, task: Task) -> AppState:
+    """Ask the outside world to carry out a task; the loop takes it up in its next turn."""
+    return state.with_tasks(task)
+
+
+def forget_tasks(state: AppState, count: int) -> AppState:
+    """Forget the first tasks, which were taken up."""
+    return replace(state, tasks=state.tasks[count:])
