@@ -8,7 +8,7 @@ from pathlib import Path
 
 from iibr_core.types import InputError
 
-NOT_PROGRAMS = {"__init__", "__main__", "boundaries", "report", "scenes", "ways"}
+NOT_PROGRAMS = {"__init__", "__main__", "report", "scenes", "ways"}
 
 
 def programs() -> list[str]:

@@ -7,8 +7,7 @@ resampled (from 224 pixels); phone (a third of the size, 8 bits, soft); network-
 network (estimated by --depth-model), guess, plane: at the best scale and shift. PSNR is the mean over the views at the
 corners and sides of the light field: whole views; what the photo sees; within 3 px of holes; in holes, which are those
 of the exact map. Flying pixels stand out from their 5 x 5 median near holes, where the truth's do not, in 10,000.
-Seconds of processor time, of all threads, are those of 9 x 9 views, set-up included. --boundaries gives the boundary F1
-of the maps, before and after they are refined.
+Seconds of processor time, of all threads, are those of 9 x 9 views, set-up included.
 """
 
 from __future__ import annotations
@@ -21,17 +20,14 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from benchmarks.boundaries import boundary_table, judge_boundaries
 from benchmarks.report import markdown
 from benchmarks.scenes import MAX_PIXELS, Scene, data_scenes, drawn_scene, with_map
-from benchmarks.ways import Way, chosen_ways, land
+from benchmarks.ways import Way, chosen_ways
 from iibr_core.color import quantise_as_stored
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.formats.outputs import write_file
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset
 
 MIN_FLYING_DIFFERENCE, MAX_CALM_DIFFERENCE = 0.12, 0.06
@@ -68,19 +64,12 @@ def main(words: Sequence[str] | None = None) -> None:
     """Run the program."""
     options = command_line().parse_args(words)
     scenes = list(chosen_scenes(options))
-    if options.boundaries:
-        print(f"{len(scenes)} scenes: {', '.join(scene.name for scene in scenes)}.\n")
-        print(boundary_table(judge_boundaries(scenes, options.maps.split(","), options.depth_model)))
-        return
     results = list(compare(scenes, chosen_ways(options.ways), options.maps.split(","), options.depth_model))
     print(f"{len(scenes)} scenes: {', '.join(scene.name for scene in scenes)}.\n")
     if options.against:
         print(changes_table(results, options.against))
     else:
         print(scene_table(results) if options.by == "scene" else mean_table(results))
-    if options.plot:
-        with write_file(options.plot) as unfinished:
-            plot(results).savefig(unfinished, format="svg", metadata={"Date": None})
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -95,8 +84,6 @@ def command_line() -> argparse.ArgumentParser:
     parser.add_argument("--depth-model", type=Path, help="ONNX file of the network of `--maps network`")
     parser.add_argument("--by", choices=["mean", "scene"], default="mean", help="rows of the table")
     parser.add_argument("--against", metavar="WAY", help="show the changes from this way instead")
-    parser.add_argument("--boundaries", action="store_true", help="boundary F1 of the maps instead, given and refined")
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="also draw PSNR over time")
     return parser
 
 
@@ -117,7 +104,7 @@ def compare(
     for make in ways.values():
         _make_views(make, drawn_scene(0, ImageSize(48, 64), sides=[(1, 1)]))  # compiles
     for scene in scenes:
-        holes = {at: land(scene.disparity, at)[1] for at in scene.truth}
+        holes = {at: reference_warp(scene.photo, scene.disparity, at).hole for at in scene.truth}
         for kind in kinds:
             given = with_map(scene, kind, model)
             for name, make in ways.items():
@@ -211,21 +198,6 @@ def changes_table(results: Sequence[Result], against: str) -> str:
             changes = ", ".join(f"{figures[k] - base[k]:+.2f}" for k in (0, 2, 3))
             rows.setdefault(way, []).append(f"{changes}; x {figures.seconds / base.seconds:.2f}")
     return markdown([f"against {against}", *kinds], ((way, *cells) for way, cells in rows.items()))
-
-
-def plot(results: Sequence[Result]) -> Figure:
-    """Return a picture of PSNR over processor time, both as means over scenes, of the first kind of map."""
-    with rc_context({"svg.hashsalt": "iibr", "font.size": 9}):
-        figure = Figure(figsize=(6.5, 4.0), layout="constrained")
-        axes = figure.subplots()
-        for (kind, way), found in means(results).items():
-            if kind == results[0].kind and way != MAPLESS:
-                axes.scatter(found.seconds, found.whole, color="#c2410c" if way.startswith("iibr") else "#64748b")
-                axes.annotate(way, (found.seconds, found.whole), xytext=(5, 4), textcoords="offset points", fontsize=8)
-        axes.set(xscale="log", xlabel="seconds of processor time for 81 views", ylabel="PSNR of whole views, dB")
-        axes.margins(x=0.25)
-        axes.grid(alpha=0.25, which="both")
-        return figure
 
 
 if __name__ == "__main__":

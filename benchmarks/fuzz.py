@@ -59,6 +59,8 @@ MEMORY_LIMIT = 3 << 30
 SIZE = ImageSize(17, 23)
 NUMBERS = (b"-1", b"0", b"1e999", b"nan", b"-inf", b"99999999999999999999", b"4294967295", b"1e-320")
 EXTREMES = (b"\0", b"\x7f", b"\xff", b"\x80\0", b"\0\x80", b"\xff\xff", b"\x7f\xff\xff\xff", b"\xff\xff\xff\xff")
+NUMBER = re.compile(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?")
+"""Number that is written as text."""
 CAMERAS = """[intrinsics]\nfocal_length_mm = 100\nimage_resolution_x_px = 512\nsensor_size_mm = 35
 [extrinsics]\nnum_cams_x = 2\nnum_cams_y = 2\nbaseline_mm = 1.0\nfocus_distance_m = 0.0\n"""
 PREFERENCES = '{"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}'
@@ -199,45 +201,32 @@ def _views(path: Path) -> list[np.ndarray] | None:
 
 
 def damaged(data: bytes, others: list[bytes]) -> st.SearchStrategy[bytes]:
-    """Return damaged copies of a file. others: files of which parts may be copied into it."""
-    parts = st.tuples(st.sampled_from(others), SHARES, LENGTHS).map(lambda drawn: _part(*drawn))
-    piece = st.sampled_from((*EXTREMES, *NUMBERS)) | st.binary(min_size=1, max_size=64) | parts
-    edits = st.lists(st.tuples(SHARES, LENGTHS, piece, st.sampled_from(EDITS)), min_size=1, max_size=6)
+    """Return copies of a file with exchanged pieces. others: files of which parts may be copied into it."""
+    shares, lengths = st.floats(0, 1, exclude_max=True), st.integers(0, 1024)
+    # Rather near the beginning: headers come first.
+    spans = st.tuples(shares, lengths).map(lambda drawn: _span(data, drawn[0] ** 2, drawn[1]))
+    spans |= shares.map(lambda share: _span(data, share, len(data)))
+    if numbers := [slice(*found.span()) for found in NUMBER.finditer(data)]:
+        spans |= st.sampled_from(numbers)
+    parts = st.tuples(st.sampled_from(others), shares, lengths).map(lambda drawn: drawn[0][_span(*drawn)])
+    piece = st.sampled_from((b"", *EXTREMES, *NUMBERS)) | st.binary(min_size=1, max_size=64) | parts
+    edits = st.lists(st.tuples(spans, piece), min_size=1, max_size=6)
     return st.tuples(edits, st.booleans()).map(lambda drawn: _edited(data, *drawn))
 
 
-def _part(data: bytes, share: float, length: int) -> bytes:
+def _span(data: bytes, share: float, length: int) -> slice:
     first = int(len(data) * share)
-    return data[first : first + length]
+    return slice(first, first + length)
 
 
-def _edited(data: bytes, edits: list[tuple[float, int, bytes, Edit]], repairs: bool) -> bytes:
-    """Return a file after edits. repairs: whether a PNG gets right lengths and checksums."""
+def _edited(data: bytes, edits: list[tuple[slice, bytes]], repairs: bool) -> bytes:
+    """Return a file with pieces in the place of spans. repairs: whether a PNG gets right lengths and checksums."""
     is_png = data.startswith(b"\x89PNG")
-    for share, length, piece, edit in edits:
-        first = int(len(data) * share**2)  # rather near the beginning: headers come first
-        data = edit(data[:first], data[first : first + length], data[first + length :], piece)[: 1 << 20]
+    for span, piece in sorted(edits, key=lambda edit: edit[0].start, reverse=True):
+        data = data[: span.start] + piece + data[span.stop :]
     return _repaired_png(data) if is_png and repairs else data
 
 
-def _exchange_number(head: bytes, middle: bytes, tail: bytes, piece: bytes) -> bytes:
-    """Put a piece in the place of the next number that is written as text."""
-    return head + re.sub(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?", lambda _: piece, middle + tail, count=1)
-
-
-Edit = Callable[[bytes, bytes, bytes, bytes], bytes]
-EDITS: tuple[Edit, ...] = (
-    lambda head, middle, tail, piece: head + piece + (middle + tail)[len(piece) :],
-    lambda head, middle, tail, piece: head + piece + middle + tail,
-    lambda head, middle, tail, piece: head,
-    lambda head, middle, tail, piece: head + tail,
-    lambda head, middle, tail, piece: head + bytes(len(middle)) + tail,
-    lambda head, middle, tail, piece: head + middle * 2 ** min(len(piece), 12) + tail,
-    lambda head, middle, tail, piece: head + middle[::-1] + tail,
-    _exchange_number,
-)
-"""Kinds of damage: functions of what stands before a part, the part, what stands behind it, and a piece."""
-SHARES, LENGTHS = st.floats(0, 1, exclude_max=True), st.integers(0, 1024)
 USUAL = settings(
     deadline=None, database=None, phases=(Phase.generate, Phase.shrink), suppress_health_check=list(HealthCheck)
 )

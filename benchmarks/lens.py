@@ -1,12 +1,11 @@
-"""Judge refocused pictures: against an exact lens, beside a plain layered picture; and against many pinhole cameras.
+"""Judge refocused pictures: against an exact lens, and against many pinhole cameras.
 
     python -m benchmarks lens [--seeds 1,2] [--discs 12,36,72] [--cameras 1024] [--photo FILE]
 
 Drawn scenes have three flat surfaces, one step of disparity apart: a wall with lamps, a ragged disc and bars. The truth
-is the mean over lens points one pixel of blur apart. The layered picture knows the map alone, as ours: three layers,
-hidden parts by cv2.inpaint. Open: no edge within reach; edges: the rest; both are the least of the three focus planes,
-in dB. Time is that of processors. The photo is judged against the sum of --cameras views, `LightField.refocus`, with
-discs of 4, 8 and 15 % of the width.
+is the mean over lens points one pixel of blur apart. Open: no edge within reach; edges: the rest; both are the least of
+the three focus planes, in dB. Time is that of processors. The photo is judged against the sum of --cameras views,
+`LightField.refocus`, with discs of 4, 8 and 15 % of the width.
 """
 
 from __future__ import annotations
@@ -112,20 +111,6 @@ def _texture(rng: np.random.Generator, rows: int, columns: int) -> FloatImage:
     return np.clip(picture, 0, 1).astype(np.float32)
 
 
-def layered(photo: FloatImage, shown: np.ndarray) -> Layers:
-    """Return the layers that photo and map show; what they hide is filled by cv2.inpaint."""
-    stored, light, opacity = np.rint(255 * photo).astype(np.uint8), [], []
-    border = (MARGIN,) * 4
-    for k in range(len(FOCI)):
-        known = (shown == k).astype(np.uint8)
-        kept = cv2.erode(known, np.ones((3, 3), np.uint8))
-        filled = stored if k == 2 else cv2.inpaint(stored, 1 - kept, 5, cv2.INPAINT_TELEA)
-        light.append(linear_from_srgb(np.float32(cv2.copyMakeBorder(filled, *border, cv2.BORDER_REFLECT_101)) / 255))
-        cover = np.float32(known if k else np.ones_like(known))
-        opacity.append(cv2.copyMakeBorder(cover, *border, cv2.BORDER_REPLICATE))
-    return Layers(np.stack(light), np.stack(opacity))
-
-
 @dataclass(frozen=True, eq=False)
 class Judge:
     """Judges pictures with discs of this size and focus. shown (H, W): number of the surface that a pixel shows."""
@@ -154,7 +139,6 @@ def exact_rows(seed: int, discs: list[int]) -> list[tuple[object, ...]]:
     scene, rows = drawn(seed), list[tuple[object, ...]]()
     photo, inner = scene.seen(0, 0), np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
     shown = np.where(scene.opacity[2][inner] > 0.5, 2, np.where(scene.opacity[1][inner] > 0.5, 1, 0))
-    anchor = layered(photo, shown)
     with tempfile.TemporaryDirectory() as folder, OffscreenScene() as viewer:
         path = Path(folder) / "scene.png"
         write_image_file(path, np.rint(65535 * photo).astype(np.uint16), "uint16")
@@ -162,28 +146,22 @@ def exact_rows(seed: int, discs: list[int]) -> list[tuple[object, ...]]:
         plan = viewer.open(Source(str(path))).plan
         assert plan is not None
         for disc in discs:
-            ours, plain, seconds = [], [], 0.0
+            judged, seconds = [], 0.0
             for focus in FOCI:
                 sharp = (focus - plan.disparity_zero) * plan.disparity_scale
                 optics = Optics(focus_disparity=sharp, aperture_diameter=disc / plan.disparity_scale)
                 judge, begun = Judge(shown, scene.seen(disc, focus), disc, focus), time.process_time()
                 picture = _picture(viewer, optics)
                 seconds += time.process_time() - begun
-                ours.append(judge(picture))
-                plain.append(judge(anchor.seen(disc, focus)))
-            time_s = f"{seconds / len(FOCI):.2f} s"
-            rows.append((f"drawn {seed}", f"{disc} px", *_least(ours), *_least(plain), time_s))
+                judged.append(judge(picture))
+            least = (f"{np.nanmin(values):.1f}" for values in zip(*judged))
+            rows.append((f"drawn {seed}", f"{disc} px", *least, f"{seconds / len(FOCI):.2f} s"))
     return rows
 
 
 def _picture(viewer: OffscreenScene, optics: Optics) -> FloatImage:
     viewer.state = replace(viewer.state, optics=optics)
     return srgb_from_linear(viewer.picture(is_linear=True))
-
-
-def _least(judged: list[tuple[float, float]]) -> list[str]:
-    """Return the least dB of all planes, in the open and at edges."""
-    return [f"{np.nanmin(values):.1f}" for values in zip(*judged)]
 
 
 def settled_rows(path: Path, cameras: int) -> list[tuple[object, ...]]:
@@ -213,7 +191,7 @@ def main() -> None:
     discs = [int(disc) for disc in options.discs.split(",")]
     if max(discs) > MARGIN:
         raise InputError(f"--discs {options.discs}: give discs of at most {MARGIN} px")
-    names = ("scene", "disc", "open, dB", "edges, dB", "layered: open", "edges", "a picture")
+    names = ("scene", "disc", "open, dB", "edges, dB", "a picture")
     print(markdown(names, (row for seed in options.seeds.split(",") for row in exact_rows(int(seed), discs))))
     print()
     names = ("photo", "widest disc", f"dB against {options.cameras} cameras")

@@ -35,7 +35,6 @@ from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_depth_file
 from iibr_core.formats.images.file_kinds import Kind
 from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, read_heic_depth
-from iibr_core.formats.images.jpeg_xl import has_depth_channel
 from iibr_core.formats.images.lfp import read_lfp_depth
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
@@ -209,8 +208,6 @@ def unread_parts(path: Path) -> tuple[str, ...]:
     """
     in_heic = " ".join(heic_auxiliaries(path)).encode() if open_picture(path).kind == "HEIC" else b""
     parts = _mattes(in_heic) + _unread_in_jpeg(_jpeg_bytes(path))
-    if has_depth_channel(path):
-        parts.append(f"a depth channel (save it, for example with djxl, as {path.stem}_depth.png)")
     return tuple(f"{path.name} holds {part}; this is not read." for part in parts)
 
 
