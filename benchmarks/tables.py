@@ -60,7 +60,6 @@ EVERY_MAP = "exact,soft,resampled,phone"
 ALONE = "--ways iibr,unchanged --maps exact,network,guess,plane --by scene --depth-model MODEL"
 TABLES = (
     Table("photo-alone", ACCURACY, f"compare {ALONE} --data DATA", 3),
-    Table("ways", ACCURACY, "compare --ways 'iibr,plain warp' --data DATA", 3),
     Table("maps", ACCURACY, f"compare --ways 'iibr,iibr map,plain warp' --maps {EVERY_MAP} --drawn 4 --data DATA", 3),
     Table("stages", ACCURACY, f"compare --ways 'iibr,iibr without' --against iibr --maps {EVERY_MAP} --data DATA", 6),
     Table("disparity", ACCURACY, "disparity --data DATA", 3),

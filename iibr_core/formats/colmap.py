@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.cameras import FieldCameras
-from iibr_core.formats.files import open_binary, read_text, reason_of
-from iibr_core.formats.pose_limits import MAX_POSES_BYTES, NamedCamera, require_count, size_of_pictures
+from iibr_core.formats.files import MAX_PART_BYTES, open_binary, parsing, read_text
+from iibr_core.formats.pose_limits import NamedCamera, require_count, size_of_pictures
 from iibr_core.types import Camera, FloatImage, ImageSize, InputError, ViewOffset
 
 MODEL_FOLDERS = ("", "sparse/0", "sparse", "colmap/sparse/0")
@@ -59,15 +59,11 @@ def model_in(folder: Path) -> Path | None:
 
 def read_colmap(model: Path) -> tuple[NamedCamera, ...]:
     """Return the cameras of a model, sorted by picture; the binary files count where both kinds exist, as in COLMAP."""
-    try:
+    with parsing(model, "is not a model of COLMAP ({}); export it again"):
         lenses, pictures = (_read_binary if _has(model, ".bin") else _read_text)(model)
         require_count(model, len(pictures))
         ordered = sorted(pictures, key=lambda picture: picture.name)
         return tuple(_camera(lenses[picture.lens], picture, f"{model}, {picture.name}") for picture in ordered)
-    except InputError:
-        raise
-    except (ValueError, LookupError, ArithmeticError, struct.error) as error:
-        raise InputError(f"{model}: is not a model of COLMAP ({reason_of(error)}); export it again") from error
 
 
 def _has(model: Path, ending: str) -> bool:
@@ -86,7 +82,7 @@ def _read_text(model: Path) -> tuple[dict[int, _Lens], list[_Picture]]:
 
 def _lines(path: Path) -> list[str]:
     """Return the lines of a file without comments; empty lines stay."""
-    return [line.strip() for line in read_text(path, MAX_POSES_BYTES).splitlines() if not line.startswith("#")]
+    return [line.strip() for line in read_text(path, MAX_PART_BYTES).splitlines() if not line.startswith("#")]
 
 
 def _read_binary(model: Path) -> tuple[dict[int, _Lens], list[_Picture]]:

@@ -20,6 +20,10 @@ MAX_INFLATION = 500
 """Largest number of decoded bytes for each byte of a file: pictures reach some tens, zlib at most 1032."""
 HARMLESS_BYTES = 256 * 2**20
 """Number of bytes that may be decoded from a file of any size."""
+MAX_FILE_BYTES = 1 << 30
+"""Number of bytes that are read of a file as a whole."""
+MAX_PART_BYTES = 64 << 20
+"""Size of the largest part of a file that is parsed: a packet of XMP, a picture in an archive, a list of cameras."""
 MAX_TEXT_BYTES = 1 << 20
 """Size of the largest text file that is read: settings and lists are smaller."""
 PARSE_ERRORS = (
@@ -40,9 +44,21 @@ def reason_of(failure: Exception | str) -> str:
     """Return why something failed, for the brackets in an InputError: the start of a library's message, in one line."""
     if isinstance(failure, OSError) and failure.strerror:
         return failure.strerror
-    lines = (" ".join(line.split()) for line in str(failure).splitlines())
+    text = f"no {failure}" if isinstance(failure, KeyError) else str(failure)
+    lines = (" ".join(line.split()) for line in text.splitlines())
     name = type(failure).__name__ if isinstance(failure, Exception) else "no reason given"
     return next(filter(None, lines), name)[:MAX_REASON_CHARACTERS]
+
+
+@contextmanager
+def parsing(name: object, fault: str, errors: tuple[type[Exception], ...] = PARSE_ERRORS) -> Iterator[None]:
+    """Raise InputError for these errors in the block: a file's name and fault, where {} stands for the reason."""
+    try:
+        yield
+    except InputError:
+        raise
+    except errors as error:
+        raise InputError(f"{name}: {fault.format(reason_of(error))}") from error
 
 
 def decoding_fault(failure: Exception | str, is_opened: bool = True) -> str:
@@ -114,10 +130,15 @@ def open_binary(path: Path) -> Iterator[BinaryIO]:
         raise InputError(f"{path}: cannot be read ({reason_of(error)}); is it still there?") from error
 
 
+def read_bytes(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
+    """Return the first bytes of a file, all of them if there are no more. Raises InputError as `open_binary` does."""
+    with open_binary(path) as file:
+        return file.read(max_bytes)
+
+
 def read_text(path: Path, max_bytes: int = MAX_TEXT_BYTES) -> str:
     """Read a text file of at most `max_bytes`, without its byte order mark; other bytes than UTF-8 become U+FFFD."""
-    with open_binary(path) as file:
-        data = file.read(max_bytes + 1)
+    data = read_bytes(path, max_bytes + 1)
     if len(data) > max_bytes:
         raise InputError(f"{path}: is larger than {max_bytes:,} bytes, as no such text is; get the right file")
     return data.decode("utf-8-sig", "replace")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import printable, read_text, reason_of
+from iibr_core.formats.files import parsing, printable, read_text
 from iibr_core.formats.quilts import SCREENS, Quilt, quilt_for
 from iibr_core.types import ImageSize, InputError
 
@@ -63,10 +63,8 @@ def read_calibration(path: Path) -> Calibration:
 
 def parse_calibration(text: str, origin: str) -> Calibration:
     """Return the calibration that a JSON text states. origin: its place, for messages. Raises InputError."""
-    try:
+    with parsing(origin, f"is no calibration ({{}}); {GET_AGAIN}"):
         stated = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{origin}: is no calibration ({reason_of(error)}); {GET_AGAIN}") from error
     if not isinstance(stated, dict):
         raise InputError(f"{origin}: is no calibration, which states a pitch, a slope and a center; {GET_AGAIN}")
     values = {key.lower(): _unwrapped(value) for key, value in stated.items()}

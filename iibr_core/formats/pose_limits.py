@@ -6,8 +6,6 @@ from iibr_core.types import Camera, ImageSize, InputError
 
 MAX_POSES = 10_000
 MAX_SIDE_PX = 2**15
-MAX_POSES_BYTES = 64 * 2**20
-"""Size of the largest text file with cameras."""
 
 
 class NamedCamera(NamedTuple):

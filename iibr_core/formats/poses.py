@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.colmap import model_in, read_colmap
-from iibr_core.formats.files import printable, read_text, reason_of, stays_within
+from iibr_core.formats.files import MAX_PART_BYTES, PARSE_ERRORS, parsing, printable, read_text, stays_within
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.maps.npy import read_array
-from iibr_core.formats.pose_limits import MAX_POSES, MAX_POSES_BYTES, NamedCamera, require_count, size_of_pictures
+from iibr_core.formats.pose_limits import MAX_POSES, NamedCamera, require_count, size_of_pictures
 from iibr_core.types import Camera, ImageSize, InputError
 
 MAX_DISTORTION = 1e-3
@@ -112,14 +112,11 @@ def _llff_camera(row: Doubles, source: str) -> Camera:
 
 
 def _read_transforms(path: Path) -> tuple[NamedCamera, ...]:
-    text = read_text(path, MAX_POSES_BYTES)
-    try:
+    text, errors = read_text(path, MAX_PART_BYTES), (msgspec.MsgspecError, *PARSE_ERRORS)
+    with parsing(path, "is not a transforms.json with poses ({}); get the file again", errors):
         content = msgspec.json.decode(text, type=dict[str, Any])
         stated = [{**content, **frame} for frame in content["frames"]]
         frames = [msgspec.convert(values, _Frame) for values in stated]
-    except (msgspec.MsgspecError, KeyError, TypeError, RecursionError) as error:
-        reason = reason_of(error)
-        raise InputError(f"{path}: is not a transforms.json with poses ({reason}); get the file again") from error
     require_count(path, len(frames))
     for number, values in enumerate(stated, 1):
         _require_pinhole(values, f"{path}, pose {number}")

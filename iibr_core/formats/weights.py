@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from iibr_core.formats.files import reason_of, require_file
+from iibr_core.formats.files import parsing, require_file
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
@@ -38,13 +38,11 @@ def save_weights(model: nn.Module, path: Path, metadata: Mapping[str, str] | Non
 def read_weights(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     """Return arrays by name and the metadata of a file of this VERSION."""
     require_file(path)
-    try:
-        with safe_open(path, framework="np") as file:
-            metadata = dict(file.metadata() or {})
-            # Copied, because these may lie in the mapped file, which must be free to be replaced.
-            arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError) as error:
-        raise InputError(f"{path}: is not a safetensors file, or is damaged ({reason_of(error)})") from error
+    errors = (SafetensorError, OSError)
+    with parsing(path, "is not a safetensors file, or is damaged ({})", errors), safe_open(path, "np") as file:
+        metadata = dict(file.metadata() or {})
+        # Copied, because these may lie in the mapped file, which must be free to be replaced.
+        arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
     content, version = metadata.get("content"), metadata.get("version")
     if content != WEIGHTS:
         raise InputError(f"{path}: holds {content or 'tensors of unknown origin'}, not {WEIGHTS}; choose another file")

@@ -31,7 +31,7 @@ from iibr_core.depth.embedded.trailers import (
     thumbnail_of,
 )
 from iibr_core.depth.estimate import DepthEstimate
-from iibr_core.formats.files import open_binary
+from iibr_core.formats.files import MAX_FILE_BYTES, read_bytes
 from iibr_core.formats.images.avif import avif_depth_file
 from iibr_core.formats.images.file_kinds import Kind
 from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, read_heic_depth
@@ -46,7 +46,6 @@ from iibr_core.formats.maps.disparity_file import has_shape_of
 from iibr_core.formats.maps.other_maps import depth_of_lzfse
 from iibr_core.types import ImageSize, InputError, Photo, image_size
 
-MAX_FILE_BYTES = 512 * 2**20
 GDEPTH, DYNAMIC_DEPTH = "Google GDepth", "Dynamic Depth"
 SAMSUNG, HUAWEI = "Samsung Live focus", "Huawei"
 SECOND_PICTURE, AVIF = "a second, grey picture", "AVIF depth"
@@ -143,7 +142,7 @@ def _in_focus(name: str, xmp: Element, data: bytes, end: int) -> bytes | None:
 
 def leia_estimate(data: bytes) -> DepthEstimate | None:
     """Return the map of a Leia image's first view, white near; None without. Raises InputError if it is damaged."""
-    leia = read_lif(data)
+    leia = read_lif(data, "Leia")
     if leia is None:
         return None
     fields = (view.inverse_depth for view in leia.views if view.image == SOURCE_IMAGE)
@@ -233,8 +232,7 @@ def _jpeg_bytes(path: Path) -> bytes:
     """Return a whole JPEG file, b"" for other and very large files. Raises InputError if it is missing."""
     if open_picture(path).kind != "JPEG" or path.stat().st_size > MAX_FILE_BYTES:
         return b""
-    with open_binary(path) as file:
-        return file.read()
+    return read_bytes(path)
 
 
 def _in_avif(path: Path) -> EmbeddedDepth | None:
@@ -248,8 +246,7 @@ def _in_heic(path: Path) -> EmbeddedDepth | None:
     depth = read_heic_depth(path)
     if depth is not None:
         return EmbeddedDepth(heic_estimate(*depth), "Apple portrait")
-    with open_binary(path) as file:
-        data = file.read(MAX_FILE_BYTES)
+    data = read_bytes(path)
     found = samsung_estimate(data)
     if found is None:
         return None

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from iibr_core.formats.images.xmp import MAX_PACKET_BYTES, parse_packet, value_in
+from iibr_core.formats.files import MAX_PART_BYTES
+from iibr_core.formats.images.xmp import parse_packet, value_in
 from iibr_core.types import InputError
 
 JPEG_START = b"\xff\xd8\xff"
@@ -103,8 +104,8 @@ def _join_parts(segments: list[bytes], name: bytes) -> bytes:
     """Return the extended packet of this name from its parts, whatever their order in the file."""
     parts = [part.groups() for part in map(EXTENDED_PART.fullmatch, segments) if part and part[1].upper() == name]
     whole = int.from_bytes(parts[0][1], "big") if parts else 1
-    if whole > MAX_PACKET_BYTES:
-        raise InputError(f"extended XMP of {whole:,} bytes exceeds {MAX_PACKET_BYTES:,}")
+    if whole > MAX_PART_BYTES:
+        raise InputError(f"extended XMP of {whole:,} bytes exceeds {MAX_PART_BYTES:,}")
     packet = bytearray()
     for _, _, place, content in sorted(parts, key=lambda part: part[2]):
         offset = int.from_bytes(place, "big")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PIL.Image import Image
 
-from iibr_core.formats.files import PARSE_ERRORS, open_binary, require_file
+from iibr_core.formats.files import PARSE_ERRORS, read_bytes, require_file
 from iibr_core.formats.images.iso_boxes import associations, boxes, meta_boxes, with_primary
 from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow
 
@@ -28,8 +28,7 @@ def open_avif(path: Path) -> Iterator[Image]:
 
 def avif_depth_file(path: Path) -> bytes | None:
     """Return an AVIF file that shows the depth map of this one, not turned by the orientation; None without."""
-    with open_binary(path) as file:
-        data = file.read()
+    data = read_bytes(path)
     try:
         for item, known in _primary_and_properties(data)[1].items():
             if any(kind == b"auxC" and content[4:].split(b"\0")[0] in DEPTH_TYPES for kind, content in known):

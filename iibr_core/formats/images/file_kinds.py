@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from iibr_core.formats.files import open_binary
+from iibr_core.formats.files import read_bytes
 
 START_BYTES = 1024
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -92,8 +92,7 @@ def kind_of(start: bytes, ending: str) -> Kind:
 
 def unreadable_kind(path: Path) -> FileKind | None:
     """Return the kind of a file that no reader took; None for an unknown one."""
-    with open_binary(path) as file:
-        start = file.read(START_BYTES).removeprefix(BYTE_ORDER_MARK)
+    start = read_bytes(path, START_BYTES).removeprefix(BYTE_ORDER_MARK)
     for pattern, kind in KINDS:
         if re.match(pattern, start, re.DOTALL):
             return kind

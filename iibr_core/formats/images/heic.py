@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, SAVE_ELSEWHERE, open_binary, require_file
+from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, SAVE_ELSEWHERE, read_bytes, require_file
 from iibr_core.formats.images.iso_boxes import boxes, meta_boxes, with_primary
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
 from iibr_core.formats.images.pillow_reader import damage_as_input_error, exif_of, facts_of, orientation_in
@@ -39,7 +39,7 @@ def heic_pair(path: Path) -> tuple[int, int] | None:
     A picture's number is that of its item; the photo itself has 0.
     """
     try:
-        meta = meta_boxes(_content(path))
+        meta = meta_boxes(read_bytes(path))
         groups = [content for kind, content in boxes(meta.get(b"grpl", b"")) if kind == b"ster"]
         items = [item for (item,) in struct.iter_unpack(">I", groups[0][GROUP_HEADER_BYTES:])] if groups else []
         primary = int.from_bytes(meta[b"pitm"][4:], "big")
@@ -92,7 +92,7 @@ def _open(path: Path, number: int = 0) -> Any:
 
     require_file(path)
     with damage_as_input_error(path):
-        content = with_primary(_content(path), number) if number else path
+        content = with_primary(read_bytes(path), number) if number else path
         file = pi_heif.open_heif(content, convert_hdr_to_8bit=False)
     if not len(file):
         raise InputError(f"{path}: holds no picture of a known codec; {SAVE_ELSEWHERE}")
@@ -100,11 +100,6 @@ def _open(path: Path, number: int = 0) -> Any:
         width, height = file.size
     require_sound_size(path, width, height, width * height * 4)
     return file
-
-
-def _content(path: Path) -> bytes:
-    with open_binary(path) as file:
-        return file.read()
 
 
 def _pixels(path: Path, picture: Any) -> NDArray[Any]:

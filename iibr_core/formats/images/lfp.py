@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, decoding_fault, open_binary, printable, reason_of
+from iibr_core.formats.files import MAX_FILE_PIXELS, MAX_PART_BYTES, decoding_fault, parsing, read_bytes
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.runtime.extras import how_to_install
@@ -27,7 +27,7 @@ SECTION_START = b"\x89LF"
 JSON_KIND = b"M"
 HEADER_BYTES, NAME_BYTES, ALIGNMENT = 16, 80, 16
 EXPORT = "export it with Lytro Desktop as a picture"
-MAX_FILE_BYTES, MAX_JSON_BYTES, MAX_PICTURES = 1 << 30, 1 << 24, 64
+MAX_PICTURES = 64
 
 Chunks = Mapping[str, bytes]
 
@@ -56,18 +56,14 @@ class Lfp:
 
 def open_lfp(path: Path) -> Lfp | None:
     """Return the contents of a processed Lytro file; None for raw ones and other files."""
-    with open_binary(path) as file:
-        if file.read(len(LFP_START)) != LFP_START:
-            return None
-        data = LFP_START + file.read(MAX_FILE_BYTES)
+    data = read_bytes(path)
+    if not data.startswith(LFP_START):
+        return None
     text, chunks, end = _sections(data)
     if end > len(data):
         raise InputError(f"{path}: cut off at {len(data):,} of {end:,} bytes or more; get the whole file again")
-    try:
+    with parsing(path, f"describes its pictures in an unknown way ({{}}); {EXPORT}"):
         return _processed(list(_objects(json.loads(text))), chunks) if text else None
-    except PARSE_ERRORS as error:
-        fault = f"no {printable(str(error))}" if isinstance(error, KeyError) else reason_of(error)
-        raise InputError(f"{path}: describes its pictures in an unknown way ({fault}); {EXPORT}") from error
 
 
 def lfp_size(path: Path) -> ImageSize:
@@ -110,7 +106,7 @@ def _sections(data: bytes) -> tuple[bytes, dict[str, bytes], int]:
             name = data[first : first + NAME_BYTES].rstrip(b"\0").decode("latin-1")
             first += NAME_BYTES
             if data[at + 3 : at + 4] == JSON_KIND:
-                text = text or data[first : first + min(length, MAX_JSON_BYTES)]
+                text = text or data[first : first + min(length, MAX_PART_BYTES)]
             else:
                 chunks.setdefault(name, data[first : first + length])
         end = first + length

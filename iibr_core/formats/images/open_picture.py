@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-from iibr_core.formats.files import open_binary, stamp_of
+from iibr_core.formats.files import read_bytes, stamp_of
 from iibr_core.formats.images.decode import Header, decode_avif, decode_other, oiio_bands, oiio_header, pillow_header
 from iibr_core.formats.images.file_kinds import RAW, START_BYTES, Kind, kind_of
 from iibr_core.formats.images.heic import heic_size, read_heic
@@ -123,8 +123,7 @@ def open_picture(path: Path) -> OpenPicture:
 
 @lru_cache(maxsize=REMEMBERED)
 def _open_picture(path: Path, stamp: tuple[int, ...]) -> OpenPicture:
-    with open_binary(path) as file:
-        start = file.read(START_BYTES)
+    start = read_bytes(path, START_BYTES)
     return OpenPicture(path, start, kind_of(start, path.suffix))
 
 

@@ -9,13 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from iibr_core.formats.files import PARSE_ERRORS, reason_of, require_file
+from iibr_core.formats.files import MAX_PART_BYTES, parsing, require_file
 from iibr_core.formats.images.decode import Header
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import open_with_pillow, orientation_in, picture_of
-from iibr_core.types import ImageSize, InputError
+from iibr_core.types import ImageSize
 
-MAX_PART_BYTES = 64 << 20
 FRAMES, METADATA = "rgbd/", "metadata"
 
 
@@ -35,7 +34,7 @@ class Recording(NamedTuple):
 def read_recording(path: Path) -> Recording:
     """Return the first frame of a recording. Raises InputError where the file is damaged or of an unknown layout."""
     require_file(path)
-    try:
+    with parsing(path, "is no recording of Record3D, or damaged ({})"):
         with zipfile.ZipFile(path) as archive:
             numbers = [name.removeprefix(FRAMES).removesuffix(".jpg") for name in archive.namelist()]
             numbers = [name for name in numbers if name.isdecimal()]
@@ -44,8 +43,6 @@ def read_recording(path: Path) -> Recording:
             photo, distances = _part(archive, f"{first}.jpg"), _part(archive, f"{first}.depth")
         size = ImageSize(int(stated["dh"]), int(stated["dw"]))
         return Recording(photo, distances, size, float(stated["K"][0]), int(stated["w"]), len(numbers))
-    except PARSE_ERRORS as error:
-        raise InputError(f"{path}: is no recording of Record3D, or damaged ({reason_of(error)})") from error
 
 
 def recording_header(path: Path, number: int) -> Header:

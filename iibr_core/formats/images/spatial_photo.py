@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.formats.animations import require_even
-from iibr_core.formats.files import PARSE_ERRORS, reason_of
+from iibr_core.formats.files import parsing
 from iibr_core.formats.images.iso_boxes import associations, box, boxes, joined, meta_boxes
 from iibr_core.formats.images.metadata import PictureMetadata, exif_for
 from iibr_core.formats.images.xmp import xmp_for
@@ -50,7 +50,7 @@ def write_spatial_photo(
     if left.shape != right.shape:
         raise InputError(f"{path}: the left picture is {left.shape}, the right one {right.shape}; give one size")
     require_even(path, image_size(left))
-    try:
+    with parsing(path, "cannot be encoded as a spatial photo ({})"):
         file = pillow_heif.from_pillow(Image.fromarray(np.ascontiguousarray(left)))
         file.add_from_pillow(Image.fromarray(np.ascontiguousarray(right)))
         encoded = BytesIO()
@@ -58,8 +58,6 @@ def write_spatial_photo(
         kept = {"exif": exif.tobytes() if exif else None, "xmp": xmp_for(metadata.xmp, {}) or None}
         file.save(encoded, quality=QUALITY, chroma=420, primary_index=0, **kept)
         stored = _with_pair(encoded.getvalue(), focal_px / left.shape[1])
-    except PARSE_ERRORS as error:
-        raise InputError(f"{path}: cannot be encoded as a spatial photo ({reason_of(error)})") from error
     with write_file(path) as temporary:
         temporary.write_bytes(stored)
 

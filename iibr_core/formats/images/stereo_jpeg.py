@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import PARSE_ERRORS, open_binary, printable
+from iibr_core.formats.files import parsing, printable, read_bytes
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import InputError
 
@@ -21,7 +21,6 @@ MPO_ENDING = ".mpo"
 END_MARK = b"\x1e\x1a"
 TRAILER_BYTES = 6
 JSON_FIELDS = (8, 7)
-MAX_FILE_BYTES = 1 << 30
 SOURCE_IMAGE = -1
 """Number that stands for the file's first JPEG among the fields."""
 LIF_ENDING = ".lif"
@@ -52,25 +51,30 @@ class Lif:
     views: tuple[LifView, ...]
 
 
-def read_lif(data: bytes) -> Lif | None:
-    """Return the contents of a file's bytes; None where they are no Leia image."""
+def read_lif(data: bytes, name: object) -> Lif | None:
+    """Return the contents of a file's bytes; None where they are no Leia image. name: the file's, for messages."""
     region, end = int.from_bytes(data[-TRAILER_BYTES:-2], "big"), len(data) - TRAILER_BYTES
     if not (data.endswith(END_MARK) and TRAILER_BYTES < region <= len(data)):
         return None  # a JPEG may end in any two bytes
     fields = _fields(data[len(data) - region : end])
     described = next((fields[number] for number in JSON_FIELDS if number in fields), None)
     if described is None:
-        raise InputError(f"its Leia fields ({printable(str(list(fields)))}) describe no views; {ADVICE}")
-    return Lif(fields, _views(described, fields))
+        raise InputError(f"{name}: its Leia fields ({printable(str(list(fields)))}) describe no views; {ADVICE}")
+    with parsing(name, "damaged (its Leia fields hold no JSON: {}); get the whole file again"):
+        parsed = json.loads(described)
+    with parsing(name, f"describes its views in an unknown way ({{}}); {ADVICE}"):
+        views = [_view(entry) for entry in parsed["views"]]
+    pictures = {number for view in views for number in (view.image, view.inverse_depth) if number is not None}
+    missing = sorted(pictures - {SOURCE_IMAGE, *fields})
+    if missing or not views:
+        lacks = f"lack the pictures {printable(str(missing))}, which they name" if missing else "list no views"
+        raise InputError(f"{name}: its Leia fields {lacks}; {ADVICE}")
+    return Lif(fields, tuple(sorted(views, key=lambda view: view.x)))
 
 
 def open_lif(path: Path) -> Lif | None:
     """Return the contents of a Leia image, None for other files, whose names must not end in .lif."""
-    with open_binary(path) as file:
-        try:
-            lif = read_lif(file.read(MAX_FILE_BYTES))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
+    lif = read_lif(read_bytes(path), path)
     if lif is None and path.suffix.lower() == LIF_ENDING:
         raise InputError(f"{path}: damaged or cut off (no Leia fields at its end); get the whole file again")
     return lif
@@ -96,26 +100,6 @@ def _fields(region: bytes) -> dict[int, bytes]:
         fields.setdefault(number, region[at : at + length])
         at += length
     return fields
-
-
-def _views(text: bytes, fields: Mapping[int, Any]) -> tuple[LifView, ...]:
-    try:
-        described = json.loads(text)
-    except PARSE_ERRORS as error:
-        raise InputError("damaged (its Leia fields hold no valid JSON); get the whole file again") from error
-    try:
-        views = [_view(entry) for entry in described["views"]]
-    except PARSE_ERRORS as error:
-        fault = f"no {printable(str(error))}" if isinstance(error, KeyError) else "another structure"
-        raise InputError(f"describes its views in an unknown way ({fault}); {ADVICE}") from error
-    pictures = {number for view in views for number in (view.image, view.inverse_depth) if number is not None}
-    if missing := sorted(pictures - {SOURCE_IMAGE, *fields}):
-        raise InputError(
-            f"its Leia fields lack the pictures {printable(str(missing))}, which they name; get the camera's file"
-        )
-    if not views:
-        raise InputError(f"its Leia fields list no views; {ADVICE}")
-    return tuple(sorted(views, key=lambda view: view.x))
 
 
 def _view(entry: Mapping[str, Any]) -> LifView:

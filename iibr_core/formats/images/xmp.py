@@ -11,10 +11,9 @@ from xml.etree.ElementTree import Element, ParseError, SubElement
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
+from iibr_core.formats.files import MAX_PART_BYTES
 from iibr_core.types import InputError
 
-MAX_PACKET_BYTES = 64 * 2**20
-"""Largest XMP: twice the size of a 100 MP camera's sharp picture as base64."""
 MAX_TAGS = 40_000
 """Largest number of tags of an XMP packet; real ones have some hundreds."""
 RDF, XMP_META, OURS = "http://www.w3.org/1999/02/22-rdf-syntax-ns#", "adobe:ns:meta/", "urn:iibr:1.0/"
@@ -47,7 +46,7 @@ def parse_packet(packet: bytes) -> Element:
 
     Raises InputError where it is no XML, declares a document type, or is too large.
     """
-    if len(packet) > MAX_PACKET_BYTES or packet.count(b"<") > MAX_TAGS:
+    if len(packet) > MAX_PART_BYTES or packet.count(b"<") > MAX_TAGS:
         raise InputError(f"XMP of {len(packet):,} bytes or its number of tags is too large")
     try:
         tree: Element = fromstring(packet.strip(b"\0 \t\r\n"), forbid_dtd=True)

@@ -16,7 +16,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from iibr_core.formats.files import entries_of, read_text, reason_of
+from iibr_core.formats.files import entries_of, parsing, read_text
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
@@ -301,10 +301,8 @@ def read_parameters(folder: Path) -> dict[str, float]:
     if not path.is_file() or path.stat().st_size == 0:
         return {}
     parser = configparser.ConfigParser(interpolation=None, strict=False)
-    try:
+    with parsing(path, "is not a valid parameter file ({}); correct or remove it", (configparser.Error,)):
         parser.read_string(read_text(path))
-    except configparser.Error as error:
-        raise InputError(f"{path}: is not a valid parameter file ({reason_of(error)}); correct or remove it") from error
     numbers: dict[str, float] = {}
     for section in parser.sections():
         for name, text in parser.items(section):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import PARSE_ERRORS, reason_of, require_file
+from iibr_core.formats.files import parsing, require_file
 from iibr_core.types import InputError
 
 USUAL_NAMES = (
@@ -23,14 +23,10 @@ def read_array(path: Path, max_values: int) -> NDArray[Any]:
 def read_named_array(path: Path, max_values: int) -> tuple[NDArray[Any], str]:
     """Return the array of an NPY file, read-only, or the map in an NPZ archive; and its name there, "" without."""
     require_file(path)
-    try:
+    with parsing(path, "is not a complete array ({}); get the file again"):
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
         is_array = isinstance(stored, np.ndarray)
         array, name = (stored, "") if is_array else _map_in(path, stored, max_values)
-    except InputError:
-        raise
-    except PARSE_ERRORS as error:
-        raise InputError(f"{path}: is not a complete array ({reason_of(error)}); get the file again") from error
     if array.dtype.kind not in "fiu":
         raise InputError(f"{path}: holds {array.dtype} of shape {array.shape}; an array of numbers is expected")
     if array.size > max_values:

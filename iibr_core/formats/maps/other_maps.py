@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, open_binary, read_text, reason_of
+from iibr_core.formats.files import MAX_FILE_PIXELS, MAX_PART_BYTES, PARSE_ERRORS, parsing, read_bytes, read_text
 from iibr_core.formats.images.file_kinds import unreadable_kind
 from iibr_core.runtime.extras import how_to_install
 from iibr_core.types import FloatImage, ImageSize, InputError
@@ -50,20 +50,18 @@ def read_other_map(path: Path) -> OtherMap | None:
 
     Raises InputError for a damaged one.
     """
-    with open_binary(path) as file:
-        start = file.read(START_BYTES)
-        size_bytes = path.stat().st_size
-        if (header := COLMAP.match(start)) is not None:
-            width, height, channels = map(int, header.groups())
-            return OtherMap(_plane(path, header.end(), (channels, height, width))[0], "depth")
-        if start.startswith(SINTEL) and len(start) >= 12:
-            width, height = struct.unpack_from("<ii", start, 4)
-            if path.suffix.lower() == ".flo" or size_bytes >= 12 + 8 * width * height:
-                return OtherMap(_disparity_of_flow(_plane(path, 12, (height, width, 2))[..., 0]), "disparity")
-            return OtherMap(_plane(path, 12, (height, width, 1))[..., 0], "depth")
-        if path.suffix.lower() == ".dmb" and len(start) >= GIPUMA.size:
-            _, height, width, channels = GIPUMA.unpack_from(start)
-            return OtherMap(_plane(path, GIPUMA.size, (height, width, channels))[..., 0], "depth")
+    start, size_bytes = read_bytes(path, START_BYTES), path.stat().st_size
+    if (header := COLMAP.match(start)) is not None:
+        width, height, channels = map(int, header.groups())
+        return OtherMap(_plane(path, header.end(), (channels, height, width))[0], "depth")
+    if start.startswith(SINTEL) and len(start) >= 12:
+        width, height = struct.unpack_from("<ii", start, 4)
+        if path.suffix.lower() == ".flo" or size_bytes >= 12 + 8 * width * height:
+            return OtherMap(_disparity_of_flow(_plane(path, 12, (height, width, 2))[..., 0]), "disparity")
+        return OtherMap(_plane(path, 12, (height, width, 1))[..., 0], "depth")
+    if path.suffix.lower() == ".dmb" and len(start) >= GIPUMA.size:
+        _, height, width, channels = GIPUMA.unpack_from(start)
+        return OtherMap(_plane(path, GIPUMA.size, (height, width, channels))[..., 0], "depth")
     if path.suffix.lower() == ".depth" or LZFSE.match(start):
         return OtherMap(_record3d_map(path), "depth")
     return None
@@ -71,8 +69,7 @@ def read_other_map(path: Path) -> OtherMap | None:
 
 def map_fault(path: Path, error: InputError) -> InputError:
     """Return the error of a file that is no picture, in words for a map: what it is, and what helps."""
-    with open_binary(path) as file:
-        start = file.read(START_BYTES)
+    start = read_bytes(path, START_BYTES)
     kind = unreadable_kind(path)
     name = next((name for mark, name in FOREIGN if start.startswith(mark)), kind.name if kind is not None else "")
     reason = str(error).removeprefix(f"{path}: ").partition("; ")[0].replace("a picture", "a map")
@@ -85,10 +82,8 @@ def depth_of_lzfse(data: bytes, name: str) -> FloatImage:
         import lzfse
     except ImportError as error:
         raise InputError(f"{name}: is compressed by LZFSE; {how_to_install('record3d')}, or {WAY_OUT}") from error
-    try:
+    with parsing(name, f"is no map of Record3D, or damaged ({{}}); {WAY_OUT}", (*PARSE_ERRORS, lzfse.error)):
         return np.frombuffer(lzfse.decompress(data), "<f4")
-    except (*PARSE_ERRORS, lzfse.error) as error:
-        raise InputError(f"{name}: is no map of Record3D, or damaged ({reason_of(error)}); {WAY_OUT}") from error
 
 
 def _plane(path: Path, start: int, shape: tuple[int, int, int]) -> NDArray[Any]:
@@ -108,8 +103,7 @@ def _disparity_of_flow(flow: FloatImage) -> FloatImage:
 
 
 def _record3d_map(path: Path) -> FloatImage:
-    with open_binary(path) as file:
-        values = depth_of_lzfse(file.read(), str(path))
+    values = depth_of_lzfse(read_bytes(path), str(path))
     size = next(filter(None, map(_stated_size, (path.parent, path.parent.parent))), RECORD3D_SIZES.get(values.size))
     if size is None or size.height * size.width != values.size:
         raise InputError(f"{path}: holds {values.size:,} distances of a map whose shape is not known; {WAY_OUT}")
@@ -119,7 +113,7 @@ def _record3d_map(path: Path) -> FloatImage:
 def _stated_size(folder: Path) -> ImageSize | None:
     """Return the size that Record3D's `metadata` in a folder states."""
     try:
-        text = read_text(folder / "metadata", 64 << 20)
+        text = read_text(folder / "metadata", MAX_PART_BYTES)
     except InputError:
         return None
     numbers = [re.search(rf'"{name}"\s*:\s*(\d{{1,5}})', text) for name in ("dh", "dw")]

@@ -219,7 +219,7 @@ AGAIN = "get the whole file again"
 BAD_LEIA: dict[str, tuple[bytes, str]] = {
     "unknown keys": (b'{"views": [{"picture": 1}]}', f"in an unknown way (no 'image'); {UNKNOWN}"),
     "no number": (b'{"views": [{"image": {"file": 1}}]}', f"in an unknown way (no 'blob_id'); {UNKNOWN}"),
-    "another form": (b'{"views": {"left": -1}}', f"in an unknown way (another structure); {UNKNOWN}"),
+    "another form": (b'{"views": {"left": -1}}', f"; {UNKNOWN}"),
     "no views": (b'{"views": []}', f"list no views; {UNKNOWN}"),
     "missing picture": (b'{"views": [{"albedoId": 7000}]}', "lack the pictures [7000], which they name"),
     "cut text": (b'{"views": [{"albe', AGAIN),
