@@ -20,13 +20,12 @@ from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, ImageSize, ViewUpdate
-from viewer.background.newest import Failed, Newest, Post
+from viewer.background.newest import Failed, Finder, Newest, Post, noting
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
-from viewer.model import messages, viewpoint
+from viewer.model import viewpoint
 from viewer.model.action import Action, do
 from viewer.model.app_state import AppState
-from viewer.model.messages import Notice
 from viewer.model.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
 
 if TYPE_CHECKING:
@@ -81,50 +80,42 @@ class FreeCameraView:
         """wake: called, in the drawing thread, when a view is made."""
         self.shown: FreeRequest | None = None
         self._scene_view = scene_view
-        self._worker: Newest[FreeRequest, FreeView | Action] = Newest("iibr-free", self._draw, wake)
         self._asked: FreeRequest | None = None
         self._may_interrupt = True
         self._ready: dict[bool, _Ready] = {}
+        newest: Newest[FreeRequest, FreeView | Action] = Newest("iibr-free", self._draw, wake)
+        self._finder = Finder(newest, self._request, self._take, self._fail)
+        self.close = self._finder.close
 
     def advance(self, state: AppState) -> list[Action]:
         """Request the camera's view, show results and report errors."""
+        actions = self._finder.advance(state)
+        has_left = self._asked is None and state.free_progress is not None
+        return [*actions, do(viewpoint.report_camera, None)] if has_left else actions
+
+    def _request(self, state: AppState) -> FreeRequest | None:
+        """Return the request of the camera. Each shows a draft at least, so a moving camera is seen to move."""
         camera, loaded, centre = state.free_camera, self._scene_view.loaded, self._scene_view.centre
         if camera is None or loaded is None or centre is None or state.shows_before:
-            return self._leave()
-        actions = self._take()
+            self._scene_view.show_fallback(None)
+            self._asked, self.shown, self._may_interrupt = None, None, True
+            self._ready = {}  # a request that is being cancelled keeps its results in the old one
+            return None
         wanted = FreeRequest(loaded, centre, camera)
-        # Each request shows at least a draft, so a camera that keeps moving is seen to move.
         if wanted != self._asked and self._may_interrupt:
             self._asked, self._may_interrupt = wanted, False
-            self._worker.submit(wanted)
-        return actions
+        return self._asked
 
-    def close(self) -> None:
-        """Stop drawing."""
-        self._worker.close()
+    def _take(self, result: FreeView | Action) -> list[Action]:
+        if isinstance(result, Action):
+            return [result]
+        self._scene_view.show_fallback(result.view)
+        self.shown, self._may_interrupt = None if result.is_draft else result.request, True
+        return []
 
-    def _leave(self) -> list[Action]:
-        if self._asked is None:
-            return []
-        self._worker.cancel()
-        self._scene_view.show_fallback(None)
-        self._asked, self.shown, self._may_interrupt = None, None, True
-        self._ready = {}  # a request that is being cancelled keeps its results in the old one
-        return [do(viewpoint.report_camera, None)]
-
-    def _take(self) -> list[Action]:
-        actions: list[Action] = []
-        while (result := self._worker.next_result()) is not None:
-            match result:
-                case FreeView(request, view, is_draft):
-                    self._scene_view.show_fallback(view)
-                    self.shown, self._may_interrupt = None if is_draft else request, True
-                case Action():
-                    actions.append(result)
-                case Failed(_, message):
-                    self._may_interrupt = True
-                    actions += [do(viewpoint.report_camera, None), do(messages.notify, Notice(message, is_error=True))]
-        return actions
+    def _fail(self, failed: Failed[FreeRequest]) -> list[Action]:
+        self._may_interrupt = True
+        return noting(do(viewpoint.report_camera, None))(failed)
 
     def _draw(self, request: FreeRequest, post: Post[FreeView | Action]) -> None:
         """Post a draft and the view. The prepared photo is kept, so the next view is made at once."""

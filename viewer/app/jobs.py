@@ -32,6 +32,7 @@ from viewer.background.window_work import Result, Steps, WindowWork
 from viewer.display.making import make_scene
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot, snapshot_of
+from viewer.gpu.refocus.picture_drawing import PictureDrawing, Pixels
 from viewer.model import saving
 from viewer.model.action import Action, do
 from viewer.model.app_state import AppState
@@ -234,12 +235,17 @@ class Jobs:
         """Return the source of an export. Raises InputError if its scene cannot be opened, Cancelled."""
         snapshot = job.snapshot or self._make_scene(job)
 
+        def report(share: float) -> None:
+            if job.kind != "export":  # exports count their pictures themselves
+                job.progress = (share, 1.0, DRAWING)
+
         def draw(settings: RenderSettings) -> NDArray[Any]:
             require_size(settings.size_px)
             request = gloss_request(settings.optics.gloss, snapshot.scene, snapshot.centre, snapshot.gloss)
             if request is not None and not snapshot.is_free_view:
                 self._run(job, _in_one_step(partial(snapshot.take_gloss, make_maps(request))))
-            return self._run(job, self._draw(job, snapshot, settings))
+            drawing = self._scene_view.renderer.start_picture
+            return self._run(job, drawn(partial(drawing, settings, snapshot.field), report))
 
         return ExportSource(snapshot.scene, snapshot.loaded, job.optics_on(snapshot.scene), draw, snapshot.centre)
 
@@ -270,16 +276,6 @@ class Jobs:
         assert job.snapshot is not None
         return job.snapshot
 
-    def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
-        """Draw a picture in the window's thread. Exports count their pictures themselves."""
-        drawing = self._scene_view.renderer.start_picture(settings, snapshot.field)
-        with closing(drawing.steps()) as steps:
-            for share in steps:
-                if job.kind != "export":
-                    job.progress = (share, 1.0, DRAWING)
-                yield
-        return drawing.image
-
     def _run(self, job: Job, steps: Steps[Result]) -> Result:
         return self._window_work.run(steps, is_urgent=job.kind != "export")
 
@@ -287,3 +283,13 @@ class Jobs:
 def _in_one_step(work: Callable[[], Result]) -> Steps[Result]:
     yield from ()
     return work()
+
+
+def drawn(start: Callable[[], PictureDrawing], report: Callable[[float], None] = lambda share: None) -> Steps[Pixels]:
+    """Draw a picture in the window's thread, a step at a time, and return its pixels. report: takes the share drawn."""
+    drawing = start()
+    with closing(drawing.steps()) as steps:
+        for share in steps:
+            report(share)
+            yield
+    return drawing.image

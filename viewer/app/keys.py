@@ -43,31 +43,22 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
 
 def _escape_actions(state: AppState) -> list[Action]:
     """Return the action that closes the topmost thing that Esc can close. Esc never quits."""
-    if state.prompt is not None:
-        return [do(messages.show_prompt, None)]
-    if state.stereo.is_shown:
-        return [do(stereo.show, False)]
-    if state.free_camera is not None and state.stroke is None:
-        return [do(viewpoint.leave_camera)]
-    if state.stroke is not None:
-        return [do(depth.drop_stroke)]
-    if state.inspection.shows_views:
-        return [do(inspection.show_views, False)]
-    if is_marking_gloss(state):
-        return [do(lens.take_gloss_brush, replace(state.gloss_brush, is_on=False))]
-    if state.shows_before:
-        return [do(lens.show_before, False)]
-    if state.tilt_handles is not None:
-        return [do(lens.show_tilt_handles, False)]
-    if state.selection is not None:
-        return [do(selection.deselect)]
-    if state.brush.is_on:
-        return [do(depth.set_brush, replace(state.brush, is_on=False))]
-    if state.inspection.comparison is not None:
-        return [do(inspection.compare, None)]
-    if state.inspection.overlay is not None:
-        return [do(inspection.set_overlay, None)]
-    return [do(window.set_fullscreen, False)] if state.is_fullscreen else []
+    can_close = (
+        (state.prompt is not None, do(messages.show_prompt, None)),
+        (state.stereo.is_shown, do(stereo.show, False)),
+        (state.free_camera is not None and state.stroke is None, do(viewpoint.leave_camera)),
+        (state.stroke is not None, do(depth.drop_stroke)),
+        (state.inspection.shows_views, do(inspection.show_views, False)),
+        (is_marking_gloss(state), do(lens.take_gloss_brush, replace(state.gloss_brush, is_on=False))),
+        (state.shows_before, do(lens.show_before, False)),
+        (state.tilt_handles is not None, do(lens.show_tilt_handles, False)),
+        (state.selection is not None, do(selection.deselect)),
+        (state.brush.is_on, do(depth.set_brush, replace(state.brush, is_on=False))),
+        (state.inspection.comparison is not None, do(inspection.compare, None)),
+        (state.inspection.overlay is not None, do(inspection.set_overlay, None)),
+        (state.is_fullscreen, do(window.set_fullscreen, False)),
+    )
+    return [closing for is_open, closing in can_close if is_open][:1]
 
 
 def read_keys(held_at: Mapping[str, tuple[bool, bool]]) -> Keys:

@@ -29,8 +29,8 @@ from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SAVE_BUDGET_S, SideEffects
 from viewer.app.stereo_screen import StereoScreen
 from viewer.app.window import Window
-from viewer.background.maps import EntropyWork, Finder, SurfaceWork, find_gloss
-from viewer.background.newest import Newest
+from viewer.background.maps import EntropyWork, SurfaceWork, find_gloss
+from viewer.background.newest import Finder, Newest, noting
 from viewer.background.tracker import Tracker
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
@@ -93,12 +93,11 @@ class App:
         self._sessions = SessionStore(kept_in, wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
         view = self.inspection_view
-        entropy, no_overlay = Newest("iibr-entropy", EntropyWork(), wake), do(inspection.set_overlay, None)
-        surface, no_surface = Newest("iibr-surface", SurfaceWork(), wake), do(selection.deselect)
+        entropy, surface = Newest("iibr-entropy", EntropyWork(), wake), Newest("iibr-surface", SurfaceWork(), wake)
         gloss = Newest("iibr-gloss", find_gloss, wake)
         self._workers: tuple[Worker, ...] = (
-            Finder(entropy, view.entropy_request, view.take_entropy, no_overlay),
-            Finder(surface, view.surface_request, view.take_surface, no_surface),
+            Finder(entropy, view.entropy_request, view.take_entropy, noting(do(inspection.set_overlay, None))),
+            Finder(surface, view.surface_request, view.take_surface, noting(do(selection.deselect))),
             Finder(gloss, self._gloss_request, self.scene_view.take_gloss),
             self.free_camera_view,
             self.stereo_screen,

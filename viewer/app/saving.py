@@ -41,51 +41,28 @@ NO_MAP = "a light field has no depth map to save"
 PictureNeeds = Callable[[Scene, Optics], Needs]
 
 
-def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
-    """Save the present picture or its depth map; show the prompt with the reason if that is not possible.
+def add_file(task: SaveTask | ExportTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
+    """Save the picture or its depth map, or export the scene; show the prompt with the reason if that is not possible,
+    or with the question whether to replace the file.
 
     inputs: files that are read.
     """
-    scene = state.scene
-    if scene is None:
+    if state.scene is None:
         return []
     prompt = saving.in_usual_folder(state, task.prompt)
     try:
-        path = checked_path(replace(task, prompt=prompt), inputs)
-        if prompt.what == "map" and scene.plan is None:
-            raise InputError(f"{path}: {NO_MAP}")
-        if not task.may_replace and jobs.writes(path):
-            raise AlreadyThereError(f"{path}: is being written")
+        if isinstance(prompt, ExportPrompt):
+            job = _export_job(prompt, task.may_replace, state, state.scene, inputs)
+        else:
+            job = _save_job(prompt, task.may_replace, state, state.scene, inputs)
+        if jobs.writes(job.path) and not task.may_replace:
+            raise AlreadyThereError(f"{job.path}: is being written")
     except InputError as error:
-        return [_ask_again(prompt, error)]
-    if prompt.what == "map":
-        work = partial(_save_map, path, prompt)
-        jobs.add(Job("map", path, state, work, lambda scene, optics: "photo", prompt=prompt), scene)
-        return [do(messages.show_prompt, None)]
-    shot = shot_of(state, prompt.size_px, prompt.form)
-    needs = partial(_needs, prompt.size_px, state.free_camera is not None)
-    jobs.add(Job("picture", path, state, partial(_save, path, shot, needs, prompt), needs, prompt=prompt), scene)
-    return [do(saving.begin_job, path)]
-
-
-def checked_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
-    """Return the path to write, with an ending if the typed one has none. inputs: files that are read, the open photo
-    first.
-
-    Raises AlreadyThereError, and InputError if it cannot be written.
-    """
-    prompt = task.prompt
-    path = Path(os.path.expanduser(prompt.path.strip()))
-    if not path.name:
-        raise InputError(saving.NO_NAME)
-    if not path.suffix:
-        path = path.with_name(f"{path.name}{'.pfm' if prompt.what == 'map' else '.png'}")
-    _require_another(path, inputs)
-    if prompt.what == "map":
-        check_output(path, inputs, task.may_replace)
-    else:
-        require_picture_place(path, prompt.size_px, inputs, task.may_replace, prompt.form)
-    return path
+        there = isinstance(error, AlreadyThereError)
+        problem = "" if there else words_of(error)
+        return [do(messages.show_prompt, replace(prompt, already_there=there, problem=problem))]
+    jobs.add(job, state.scene)
+    return [do(messages.show_prompt, None) if job.kind == "map" else do(saving.begin_job, job.path, job.prompt)]
 
 
 def add_copy(state: AppState, jobs: Jobs) -> list[Action]:
@@ -98,36 +75,47 @@ def add_copy(state: AppState, jobs: Jobs) -> list[Action]:
     return []
 
 
-def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
-    """Export the present scene; show the prompt with the reason if that is not possible.
+def _save_job(prompt: SavePrompt, may_replace: bool, state: AppState, scene: Scene, inputs: Sequence[Path]) -> Job:
+    path = checked_path(prompt, may_replace, inputs)
+    if prompt.what == "map":
+        if scene.plan is None:
+            raise InputError(f"{path}: {NO_MAP}")
+        work = partial(_save_map, path, prompt)
+        return Job("map", path, state, work, lambda scene, optics: "photo", prompt=prompt)
+    needs = partial(_needs, prompt.size_px, state.free_camera is not None)
+    shot = shot_of(state, prompt.size_px, prompt.form)
+    return Job("picture", path, state, partial(_save, path, shot, needs, prompt), needs, prompt=prompt)
 
-    inputs: files that are read.
+
+def checked_path(prompt: SavePrompt, may_replace: bool, inputs: Sequence[Path]) -> Path:
+    """Return the path to write, with an ending if the typed one has none. inputs: files that are read, the open photo
+    first.
+
+    Raises AlreadyThereError, and InputError if it cannot be written.
     """
-    scene = state.scene
-    if scene is None:
-        return []
-    prompt = saving.in_usual_folder(state, task.prompt)
-    try:
-        kind = export_kind(prompt.kind)
-        path = saving.written_path(kind, prompt.path, scene, prompt.options)
-        _require_another(path, inputs)
-        require_export_place(kind, path, inputs, task.may_replace)
-        if kind.needs:
-            require_extra("export", *kind.needs)
-        if jobs.writes(path):
-            raise InputError(f"{path} is being written by another export. Choose another name.")
-    except InputError as error:
-        return [_ask_again(prompt, error)]
+    path = Path(os.path.expanduser(prompt.path.strip()))
+    if not path.name:
+        raise InputError(saving.NO_NAME)
+    if not path.suffix:
+        path = path.with_name(f"{path.name}{'.pfm' if prompt.what == 'map' else '.png'}")
+    _require_another(path, inputs)
+    if prompt.what == "map":
+        check_output(path, inputs, may_replace)
+    else:
+        require_picture_place(path, prompt.size_px, inputs, may_replace, prompt.form)
+    return path
+
+
+def _export_job(prompt: ExportPrompt, may_replace: bool, state: AppState, scene: Scene, inputs: Sequence[Path]) -> Job:
+    kind = export_kind(prompt.kind)
+    path = saving.written_path(kind, prompt.path, scene, prompt.options)
+    _require_another(path, inputs)
+    require_export_place(kind, path, inputs, may_replace)
+    if kind.needs:
+        require_extra("export", *kind.needs)
     prompt = replace(prompt, options=replace(prompt.options, rack=clicked_rack(state)))
     work, pictures = partial(_export, kind, path, prompt), partial(optics_of, kind, prompt.options)
-    jobs.add(Job("export", path, state, work, pictures=pictures, prompt=prompt), scene)
-    return [do(saving.begin_job, path, prompt)]
-
-
-def _ask_again(prompt: SavePrompt | ExportPrompt, error: InputError) -> Action:
-    """Return the prompt with the problem, or with the question whether to replace the file."""
-    there = isinstance(error, AlreadyThereError)
-    return do(messages.show_prompt, replace(prompt, already_there=there, problem="" if there else words_of(error)))
+    return Job("export", path, state, work, pictures=pictures, prompt=prompt)
 
 
 def _require_another(path: Path, inputs: Sequence[Path]) -> None:

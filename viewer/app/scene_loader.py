@@ -17,7 +17,7 @@ from iibr_core.scenes.scene import (
 )
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.depth_models import DepthFinder, focus_before_and_now
-from viewer.background.newest import Failed, Newest, Post
+from viewer.background.newest import Failed, Finder, Newest, Post
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_sketch, read_whole_photo
 from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWork, WorkReport
 from viewer.display.depth_preview import DepthPreview
@@ -62,9 +62,8 @@ class SceneLoader:
         self._work = SceneWork()
         self._worker = Newest("iibr-scene", self._work, wake)
         self._preview = DepthPreview(scene_view)
-        self._depth_finder = DepthFinder(wake)
-        self._brush_loader = Newest("iibr-brush", _prepare_brush, wake)
-        self._is_brush_asked = False
+        self._depth_finder = DepthFinder(lambda: scene_view.loaded, wake)
+        self._brush_loader = Finder(Newest("iibr-brush", _prepare_brush, wake), self._brush_request, lambda _: None)
         self._submitted = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
@@ -78,10 +77,7 @@ class SceneLoader:
         self._work.eye = eye
 
     def advance(self, state: AppState) -> list[Action]:
-        """Submit the source that the state asks for, read the next photos, and show what came of it.
-
-        The brush is prepared once the first photo's views are there, so that the first stroke does not wait.
-        """
+        """Submit the source that the state asks for, read the next photos, and show what came of it."""
         if sketch := self._show_sketch(state):
             return sketch  # the rest goes by the state that shows it
         if state.stopped == state.generation != self._stopped:
@@ -92,11 +88,7 @@ class SceneLoader:
         if is_wanted and state.source is not None and state.stroke is None:
             self._load(state, state.source)
         self._read_ahead(state)
-        is_brush_next = self._scene_view.loaded is not None and (state.progress.is_complete or state.brush.is_on)
-        if is_brush_next and not self._is_brush_asked:
-            self._is_brush_asked = True
-            self._brush_loader.submit(None)
-        return self._preview_depth(state) + self._take_results(state)
+        return self._preview_depth(state) + self._take_results(state) + self._brush_loader.advance(state)
 
     def _take_results(self, state: AppState) -> list[Action]:
         """Return results as actions, at least one result, and more until TAKING_S are over.
@@ -104,7 +96,7 @@ class SceneLoader:
         Progress alone is returned every PROGRESS_S, and when it is complete.
         """
         until = time.perf_counter() + TAKING_S
-        actions = self._depth_finder.advance(state, self._scene_view.loaded)
+        actions = self._depth_finder.advance(state)
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             self._held += self._take(result, state)
             self._is_urgent |= not (isinstance(result, ViewReady | WorkReport) and not result.progress.is_complete)
@@ -191,7 +183,7 @@ class SceneLoader:
 
     def _load(self, state: AppState, source: Source) -> None:
         """Submit a new generation. The photo is read again only if another one was opened."""
-        loaded, plan = self._depth_finder.newest(self._scene_view.loaded), None
+        loaded, plan = self._depth_finder.newest(), None
         if not self._reuses_photo(state):
             self._keep_left(state)
             self._worker.cancel()
@@ -204,6 +196,11 @@ class SceneLoader:
         strength, settings = requested_strength(state), self._depth_settings
         request = SceneRequest(state.generation, source, strength, loaded, settings, plan=plan, asks_model=False)
         self._worker.submit(request)
+
+    def _brush_request(self, state: AppState) -> str | None:
+        """Return that the brush is prepared, once a photo's views are there: then the first stroke does not wait."""
+        is_next = self._scene_view.loaded is not None and (state.progress.is_complete or state.brush.is_on)
+        return "brush" if is_next else None
 
     def _reuses_photo(self, state: AppState) -> bool:
         """Return whether the photo that is asked for is open, and all of it was read."""
@@ -241,7 +238,7 @@ class SceneLoader:
             self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_done, photos)])
 
 
-def _prepare_brush(request: None, post: Post[None]) -> None:
+def _prepare_brush(request: str, post: Post[None]) -> None:
     from iibr_core.scenes.photo import prepare_brush
 
     prepare_brush()

@@ -5,9 +5,9 @@ It replaces the picture from the views once it is ready, until anything changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import closing
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
+from viewer.app.jobs import drawn
 from viewer.background.newest import Failed, Newest, Post
 from viewer.background.window_work import WindowWork
 from viewer.display.scene_view import Picture, SceneView
@@ -89,7 +90,7 @@ class Sharpener:
         from iibr_core.exports.full_drawing import draw_full
 
         def draw(settings: RenderSettings) -> NDArray[Any]:
-            return self._window_work.run(self._draw(settings))
+            return self._window_work.run(drawn(partial(self._scene_view.renderer.start_picture, settings)))
 
         def keep(photo: LargePhoto) -> None:
             self._kept = request.loaded, photo
@@ -98,14 +99,6 @@ class Sharpener:
         photo = kept[1] if kept is not None and kept[0] is request.loaded else None
         light = draw_full(request, draw, photo, keep)
         post(encode_light(light, False, SRGB, request.scene.color_space))
-
-    def _draw(self, settings: RenderSettings) -> Generator[None, None, NDArray[Any]]:
-        """Draw a tile, a step at a time."""
-        drawing = self._scene_view.renderer.start_picture(settings)
-        with closing(drawing.steps()) as steps:
-            for _ in steps:
-                yield
-        return drawing.image
 
     def _request_of(self, picture: Picture, state: AppState) -> FullPicture | None:
         """Return the request for the visible part, None if the photo has no more detail than the views."""

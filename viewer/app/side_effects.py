@@ -19,7 +19,7 @@ from viewer.app.clipboard import paste_picture
 from viewer.app.dialogs import Dialog, ask_for_path, ask_for_place, has_dialogs, list_folder
 from viewer.app.jobs import Jobs
 from viewer.app.picture_files import inputs_of_scene
-from viewer.app.saving import add_copy, add_export, add_save
+from viewer.app.saving import add_copy, add_file
 from viewer.background.depth_models import actions_of_download, download, list_models
 from viewer.background.newest import Newest, message_of
 from viewer.display.scene_view import SceneView
@@ -101,10 +101,8 @@ class SideEffects:
                 self._submit(partial(_find_recent, state))
             case tasks.PlainTask("list folder", path):
                 self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
-            case tasks.SaveTask():
-                return add_save(task, state, self._inputs(state), self._jobs)
-            case tasks.ExportTask():
-                return add_export(task, state, self._inputs(state), self._jobs)
+            case tasks.SaveTask() | tasks.ExportTask():
+                return add_file(task, state, self._inputs(state), self._jobs)
             case tasks.CancelJobTask(id_):
                 self._jobs.cancel(id_)
             case tasks.ShowFileTask(path, in_folder):

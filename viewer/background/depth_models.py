@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -14,8 +14,8 @@ from iibr_core.depth.models.download import NoConnectionError
 from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
 from iibr_core.runtime.work import Cancelled, watched
 from iibr_core.scenes.scene import LoadedPhoto, Source
-from iibr_core.types import FloatImage, InputError
-from viewer.background.newest import Failed, Newest, Post
+from iibr_core.types import FloatImage, InputError, Photo
+from viewer.background.newest import Failed, Finder, Newest, Post, noting
 from viewer.model import depth_models, messages
 from viewer.model.action import Action, do
 from viewer.model.app_state import AppState
@@ -27,63 +27,60 @@ MEGABYTE = 1e6
 OFFLINE = "No internet connection. Nothing is lost."
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class EstimateRequest:
     """The open photo, the name or path of a model, and whether edges are refined."""
 
-    source: Source
-    loaded: LoadedPhoto
+    photo: Photo
     model: str
-    refine: bool
+    loaded: LoadedPhoto = field(compare=False)
+    source: Source = field(compare=False)
+    refine: bool = field(compare=False)
 
 
-class DepthFinder:
+class DepthFinder(Finder[EstimateRequest, tuple[str, LoadedPhoto]]):
     """Estimates depth of the open photo where the state wants that. Called from the thread of the window."""
 
-    def __init__(self, wake: Callable[[], None]) -> None:
-        """wake: called, in the thread, when a result was posted."""
-        self._newest: Newest[EstimateRequest, LoadedPhoto] = Newest("iibr-depth", _estimate, wake)
-        self._asked: EstimateRequest | None = None
+    def __init__(self, loaded: Callable[[], LoadedPhoto | None], wake: Callable[[], None]) -> None:
+        """loaded: returns the open photo. wake: called, in the thread, when a result was posted."""
+        super().__init__(Newest("iibr-depth", _estimate, wake), self._request, self._take_estimate, _failure)
+        self._loaded = loaded
         self._found: LoadedPhoto | None = None
-        self.close = self._newest.close
 
-    def advance(self, state: AppState, loaded: LoadedPhoto | None) -> list[Action]:
-        """Return what came of an estimate, and start the one that is wanted now."""
-        result = self._newest.next_result()
-        if result is not None and self._asked is not None:
-            model, self._asked = self._asked.model, None
-            if isinstance(result, Failed):
-                return [do(depth_models.report_failure, model, result.message)]
-            self._found = result
-            return [do(depth_models.take_estimate, model)]
-        self._start(state, loaded)
-        return []
-
-    def newest(self, loaded: LoadedPhoto | None) -> LoadedPhoto | None:
-        """Return the loaded photo, with the depth that was estimated for it if the screen does not show that yet."""
-        found = self._found
-        is_other = loaded is None or found is None or found.photo.pixels is not loaded.photo.pixels
-        if loaded is None or found is None or is_other or found.found is loaded.found:
+    def newest(self) -> LoadedPhoto | None:
+        """Return the open photo, with the depth that was estimated for it if the screen does not show that yet."""
+        found, loaded = self._found, self._loaded()
+        if (
+            loaded is None
+            or found is None
+            or found.photo.pixels is not loaded.photo.pixels
+            or found.found is loaded.found
+        ):
             self._found = None
             return loaded
         return found
 
-    def _start(self, state: AppState, loaded: LoadedPhoto | None) -> None:
-        model, asked = depth_models.wanted_model(state), self._asked
-        if model is None or loaded is None or state.scene is None:
-            self._newest.cancel()
-            self._asked = None
-        elif asked is None or model != asked.model or loaded.photo.pixels is not asked.loaded.photo.pixels:
-            self._asked = EstimateRequest(state.scene.source, loaded, model, state.depth.refine)
-            self._newest.submit(self._asked)
+    def _request(self, state: AppState) -> EstimateRequest | None:
+        model, loaded, scene = depth_models.wanted_model(state), self._loaded(), state.scene
+        if model is None or loaded is None or scene is None:
+            return None
+        return EstimateRequest(loaded.photo, model, loaded, scene.source, state.depth.refine)
+
+    def _take_estimate(self, estimate: tuple[str, LoadedPhoto]) -> list[Action]:
+        model, self._found = estimate
+        return [do(depth_models.take_estimate, model)]
 
 
-def _estimate(request: EstimateRequest, post: Post[LoadedPhoto]) -> None:
+def _failure(failed: Failed[EstimateRequest]) -> list[Action]:
+    return [do(depth_models.report_failure, failed.request.model, failed.message)]
+
+
+def _estimate(request: EstimateRequest, post: Post[tuple[str, LoadedPhoto]]) -> None:
     from iibr_core.scenes.photo import deepen
 
     source = request.source
     source = replace(source, depth=replace(source.depth, file=None, start="model", model=request.model))
-    post(deepen(source, request.loaded, request.refine))
+    post((request.model, deepen(source, request.loaded, request.refine)))
 
 
 def download(name: str, post: Post[Action]) -> None:
@@ -122,9 +119,7 @@ def _failure_notice(error: InputError, name: str) -> Notice:
 
 def actions_of_download(result: Action | Failed[str]) -> list[Action]:
     """Return what follows from a step of a download, or from its failure."""
-    if isinstance(result, Failed):
-        return [do(depth_models.set_downloading, None), do(messages.notify, Notice(result.message, is_error=True))]
-    return [result]
+    return noting(do(depth_models.set_downloading, None))(result) if isinstance(result, Failed) else [result]
 
 
 def list_models() -> tuple[ModelOffer, ...]:

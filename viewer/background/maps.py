@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Generic
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +13,8 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from iibr_core.stages import CLOSED_FORM
-from viewer.background.newest import Failed, Newest, Post, Request, Result
-from viewer.model import messages
-from viewer.model.action import Action, do
-from viewer.model.app_state import AppState
+from viewer.background.newest import Post
 from viewer.model.inspection import ViewIndex
-from viewer.model.messages import Notice
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -117,37 +112,6 @@ def outline_of(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         around = np.pad(inside, 1, mode="edge")
         inside = inside & around[2:, 1:-1] & around[:-2, 1:-1] & around[1:-1, 2:] & around[1:-1, :-2]
     return mask & ~inside
-
-
-class Finder(Generic[Request, Result]):
-    """Finds maps that the state asks for, in a thread; equal requests are made once."""
-
-    def __init__(
-        self,
-        newest: Newest[Request, Result],
-        request_for: Callable[[AppState], Request | None],
-        take: Callable[[Result], Sequence[Action] | None],
-        give_up: Action | None = None,
-    ) -> None:
-        """request_for: returns the request of a state. take: shows a result. give_up: follows a failure."""
-        self._asked: Request | None = None
-        self._newest, self._request_for, self._take, self._give_up = newest, request_for, take, give_up
-        self.close = newest.close
-
-    def advance(self, state: AppState) -> list[Action]:
-        """Show new results, report failures, and begin the request of the state."""
-        actions: list[Action] = []
-        while (result := self._newest.next_result()) is not None:
-            if isinstance(result, Failed):
-                failure = do(messages.notify, Notice(result.message, is_error=True))
-                actions += [failure] if self._give_up is None else [failure, self._give_up]
-            else:
-                actions += self._take(result) or ()
-        request, before = self._request_for(state), self._asked
-        self._asked = request
-        if request is not None and request != before:
-            self._newest.submit(request)
-        return actions
 
 
 def find_gloss(request: GlossRequest, post: Post[GlossMaps]) -> None:

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError
+from viewer.model import messages
+from viewer.model.action import Action, do
+from viewer.model.app_state import AppState
+from viewer.model.messages import Notice
 from viewer.model.remedies import words_of
 
 MAX_WAITING_RESULTS = 8
@@ -109,3 +113,39 @@ def message_of(error: Exception) -> str:
     """Return an error as one line for people, with its kind unless it is an input error."""
     text = " ".join(words_of(error).split())
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text or 'no message'}"
+
+
+def noting(*consequences: Action) -> Callable[[Failed[Any]], list[Action]]:
+    """Return the function from a failure to the notice that shows it and these actions."""
+    return lambda failed: [do(messages.notify, Notice(failed.message, is_error=True)), *consequences]
+
+
+class Finder(Generic[Request, Result]):
+    """Finds what the state asks for; equal requests are carried out once, one that it no longer asks for is stopped."""
+
+    def __init__(
+        self,
+        newest: Newest[Request, Result],
+        request_for: Callable[[AppState], Request | None],
+        take: Callable[[Result], Sequence[Action] | None],
+        fail: Callable[[Failed[Request]], Sequence[Action]] | None = None,
+    ) -> None:
+        """request_for: returns the request of a state. take: shows a result. fail: returns what follows a failure, for
+        None a notice.
+        """
+        self._asked: Request | None = None
+        self._newest, self._request_for, self._take, self._fail = newest, request_for, take, fail or noting()
+        self.close = newest.close
+
+    def advance(self, state: AppState) -> list[Action]:
+        """Show new results, report failures, and begin the request of the state."""
+        actions: list[Action] = []
+        while (result := self._newest.next_result()) is not None:
+            actions += self._fail(result) if isinstance(result, Failed) else self._take(result) or ()
+        request, before = self._request_for(state), self._asked
+        self._asked = request
+        if request is None:
+            self._newest.cancel()
+        elif request != before:
+            self._newest.submit(request)
+        return actions

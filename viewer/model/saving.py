@@ -117,7 +117,7 @@ class SavedSettings:
 MAX_FILES = 12
 """Number of saved and exported files in the list."""
 Asked = ExportPrompt | SavePrompt
-PlacePrompt = TypeVar("PlacePrompt", SavePrompt, ExportPrompt)
+PlacePrompt = TypeVar("PlacePrompt", bound=SavePrompt | ExportPrompt)
 NO_NAME = "There is no name yet. Type one, or press Browse…"
 
 

@@ -22,7 +22,6 @@ from viewer.model import lens
 from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.saving import SavePrompt
-from viewer.model.tasks import SaveTask
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +75,7 @@ def test_a_place_is_checked_before_anything_is_drawn(tmp_path, what):
 
     def place(name, may_replace=False):
         prompt = SavePrompt(f" {tmp_path / name} " if name else "", ScreenSize(8, 8), what=what)
-        return checked_path(SaveTask(prompt, may_replace), (photo,))
+        return checked_path(prompt, may_replace, (photo,))
 
     assert place("a") == tmp_path / ("a.png" if what == "picture" else "a.pfm")
     assert place("taken.png", may_replace=True) == taken
@@ -91,7 +90,7 @@ def test_a_place_is_checked_before_anything_is_drawn(tmp_path, what):
 @pytest.mark.parametrize("size", [ScreenSize(0, 5), ScreenSize(5, -1), ScreenSize(16384, 16384)])
 def test_absurd_sizes_are_refused(tmp_path, size):
     with pytest.raises(InputError, match="1 to 100 million"):
-        checked_path(SaveTask(SavePrompt(str(tmp_path / "a.png"), size)), ())
+        checked_path(SavePrompt(str(tmp_path / "a.png"), size), False, ())
 
 
 def test_the_inputs_of_a_scene_are_its_files(tmp_path):

@@ -32,15 +32,16 @@ def test_an_estimate_that_comes_after_the_next_photo_was_asked_for_is_not_shown_
     paths = (write_scene(tmp_path, name) for name in ("a", "b"))
     first, second = (Source(str(path), DepthChoice(start="rough"), GridShape(3, 3)) for path in paths)
     came = Event()
-    with closing(DepthFinder(came.set)) as finder:
-        before, photo = opened(AppState(), first)
+    before, photo = opened(AppState(), first)
+    shown = [photo]
+    with closing(DepthFinder(lambda: shown[-1], came.set)) as finder:
         wanted = reduce(before, do(depth_models.use_model, model))
-        assert finder.advance(wanted, photo) == []
+        assert finder.advance(wanted) == []
         assert came.wait(DEADLINE_S)
         asked = reduce(wanted, do(opening.open_source, second))
-        (late,) = finder.advance(asked, photo)
+        (late,) = finder.advance(asked)
         assert reduce(asked, late) is asked
-        _, next_photo = opened(asked, second)
-        assert finder.newest(next_photo) is next_photo
+        shown.append(opened(asked, second)[1])
+        assert finder.newest() is shown[-1]
         same = reduce(wanted, do(opening.open_source, Source(first.path)))
         assert (asked.preferences.depth_model, same.preferences.depth_model) == (model, ""), "chosen for further photos"
