@@ -1,4 +1,4 @@
-"""All views: as a light field, or with their cameras for programs that reconstruct scenes (LLFF, COLMAP)."""
+"""All views: as a light field, as NumPy arrays, or with their cameras for programs that reconstruct scenes."""
 
 import math
 from contextlib import closing
@@ -18,7 +18,8 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields import write
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex
 from iibr_core.formats.light_fields.views import offsets_by_place
-from iibr_core.formats.outputs import write_folder
+from iibr_core.formats.outputs import write_file, write_folder
+from iibr_core.method.memory import require_memory
 from iibr_core.scenes.light_fields import find_range, open_field
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
@@ -123,6 +124,26 @@ def write_light_field(path: Path, source: ExportSource, options: ExportOptions, 
     with closing(source.views()) as views:
         write.write_light_field(path, variant, scene.grid, views, focal_px, scene.name, True, scale)
     return write.note_on_rows(scene.row_step)
+
+
+def write_arrays(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Write all views, their known disparity and their places as arrays of an NPZ file.
+
+    views: (rows, columns, H, W, 3), bytes, sRGB-encoded. disparity: (rows, columns, H, W), float32, in pixels per view
+    step, larger is nearer, NaN where it is not known. offsets: (rows, columns, 2), steps down and right of the centre.
+    """
+    scene, grid = source.scene, source.scene.grid
+    shape = (*grid, scene.height, scene.width)
+    require_memory(7 * math.prod(shape), f"{grid.columns} x {grid.rows} views of {scene.name} as arrays")
+    views, disparity = np.zeros((*shape, 3), np.uint8), np.full(shape, np.nan, np.float32)
+    with closing(source.views(with_disparity=True)) as made:
+        for view in made:
+            views[view.row, view.column] = colors_of(view)
+            if view.disparity is not None:
+                disparity[view.row, view.column] = view.disparity
+    offsets = np.array([grid.offset(*place) for place in np.ndindex(*grid)], np.float32).reshape(*grid, 2)
+    with write_file(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, views=views, disparity=disparity, offsets=offsets)
 
 
 def _scale_of(source: ExportSource, focal_px: float) -> write.FieldScale:

@@ -15,8 +15,8 @@ from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import stored_from_encoded
-from iibr_core.exports.full_picture import MAX_PIXELS, FullPicture, encode_light
-from iibr_core.exports.render_settings import LensTile, RenderSettings
+from iibr_core.exports.full_picture import FullPicture, encode_light
+from iibr_core.exports.render_settings import MAX_PIXELS, LensTile, RenderSettings
 from iibr_core.exports.source import Draw
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped, report_progress

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
+from iibr_core.exports.render_settings import MAX_PIXELS
 from iibr_core.method.memory import require_memory
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.tiling import in_bands
@@ -17,8 +18,6 @@ from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace, FloatImage, InputError, image_size
 
-MAX_PIXELS = 100_000_000
-"""Largest number of pixels of the photo; a larger photo is read at this size."""
 OWN_SIZE_BYTES = 60
 """Bytes of a pixel of a picture at the photo's own size, while it is drawn."""
 

@@ -208,7 +208,7 @@ EXPORTS = {
         purpose="software",
     ),
     "matte": ExportKind(
-        "Matte of a surface", GREY, "matte:write_matte", ("at", "tolerance"), has_colors=False, purpose="software"
+        "Matte of a surface", GREY, "lens_maps:write_matte", ("at", "tolerance"), has_colors=False, purpose="software"
     ),
     "splats": ExportKind("Gaussian splats", (".ply", ".spz"), "points:write_gaussians", purpose="software"),
     "mesh": ExportKind("Textured mesh, GLB", (".glb",), "mesh:write_mesh", purpose="software"),
@@ -218,7 +218,7 @@ EXPORTS = {
     "colmap": _cameras("Cameras, COLMAP", "colmap"),
     "hci": _light_field("Light field, HCI folder", "hci"),
     "eslf": _light_field("Light field, lenslet image", "eslf", ("_eslf.png",)),
-    "npz": ExportKind("Light field, NumPy arrays", (".npz",), "arrays:write_arrays", GRID, purpose="software"),
+    "npz": ExportKind("Light field, NumPy arrays", (".npz",), "cameras:write_arrays", GRID, purpose="software"),
 }  # fmt: skip
 """The kinds by the name that the user types."""
 

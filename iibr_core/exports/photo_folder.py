@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from iibr_core.exports.kinds import EXPORTS
+from iibr_core.formats.light_fields.grids import natural_key
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
 from iibr_core.formats.maps.map_names import FOLDER_OF_MAPS, FOLDER_OF_PHOTOS, map_name, photo_keys
 
@@ -77,10 +78,5 @@ def first_photo(folder: Path) -> Path | None:
 
 def in_order(photos: Iterable[FolderPhoto], order: FolderOrder) -> tuple[FolderPhoto, ...]:
     """Return photos by time, or by name with numbers in their natural order: IMG_9 before IMG_10."""
-    by_name = sorted(photos, key=lambda photo: _natural_key(photo.name))
+    by_name = sorted(photos, key=lambda photo: natural_key(Path(photo.name)))
     return tuple(by_name if order == "name" else sorted(by_name, key=lambda photo: photo.modified_s))
-
-
-def _natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
-    parts = re.split(r"(\d+)", name.casefold())
-    return tuple((0, int(part[:18]), "") if part.isdecimal() else (1, 0, part) for part in parts)

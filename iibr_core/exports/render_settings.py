@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from iibr_core.beyond.hidden_surfaces import HiddenSurface
 
 MAX_PIXELS = 100_000_000
-"""Largest number of pixels of a picture; as linear light it takes 1.2 GB."""
+"""Largest number of pixels of a picture, and of the photo it is drawn from; as linear light it takes 1.2 GB."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,7 @@
 """Cameras of a light field's views, written for reconstruction programs: LLFF, nerfstudio; see also `colmap.py`.
 
+Records and limits of files with cameras are here, too, for the readers in `poses.py` and `colmap.py`.
+
 All cameras look the same way, from a plane. Lengths are in distances of the nearest point: disparity gives depth up to
 its unit. A plane that stands still in the field lies at a finite distance, but moves in cameras that look straight
 ahead; therefore their principal points move, unless views are cropped, see `FieldCameras.centred`.
@@ -12,11 +14,14 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import Camera, FloatImage, GridShape, ImageSize, InputError, ViewOffset
 
+MAX_POSES, MAX_SIDE_PX = 10_000, 2**15
+"""Largest number of cameras in a file, and side of their pictures."""
 MAX_DEPTH_RATIO = 20.0
 """Ratio of the farthest depth to the nearest one where the disparity at infinity is unknown."""
 MIN_BOUNDS_RATIO = 1.1
@@ -25,6 +30,26 @@ MIN_KEPT = 0.6
 """Smallest share of a view that is left when views are cropped."""
 MAX_OFF_CENTRE_PX = 0.5
 """Largest distance of a principal point from the middle in files that cannot state it."""
+
+
+class NamedCamera(NamedTuple):
+    """A camera and the name of its picture as the file states it, "" where it states none."""
+
+    picture: str
+    camera: Camera
+
+
+def require_count(source: object, count: int) -> None:
+    """Raise InputError unless this is a possible number of poses."""
+    if not 1 <= count <= MAX_POSES:
+        raise InputError(f"{source}: holds {count} poses; give 1 to {MAX_POSES}")
+
+
+def size_of_pictures(height: float, width: float, source: str) -> ImageSize:
+    """Return the size that a camera states for its pictures."""
+    if not (1 <= height <= MAX_SIDE_PX and 1 <= width <= MAX_SIDE_PX):
+        raise InputError(f"{source}: pictures of {width:g}x{height:g} pixels; give 1 to {MAX_SIDE_PX} each way")
+    return ImageSize(round(height), round(width))
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.cameras import FieldCameras
+from iibr_core.formats.cameras import FieldCameras, NamedCamera, require_count, size_of_pictures
 from iibr_core.formats.files import MAX_PART_BYTES, open_binary, parsing, read_text
-from iibr_core.formats.pose_limits import NamedCamera, require_count, size_of_pictures
 from iibr_core.types import Camera, FloatImage, ImageSize, InputError, ViewOffset
 
 MODEL_FOLDERS = ("", "sparse/0", "sparse", "colmap/sparse/0")

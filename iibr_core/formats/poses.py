@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.cameras import MAX_POSES, NamedCamera, require_count, size_of_pictures
 from iibr_core.formats.colmap import model_in, read_colmap
 from iibr_core.formats.files import MAX_PART_BYTES, PARSE_ERRORS, parsing, printable, read_text, stays_within
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.maps.npy import read_array
-from iibr_core.formats.pose_limits import MAX_POSES, NamedCamera, require_count, size_of_pictures
 from iibr_core.types import Camera, ImageSize, InputError
 
 MAX_DISTORTION = 1e-3

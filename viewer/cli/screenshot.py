@@ -12,7 +12,8 @@ import typer
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.exports.full_picture import MAX_PIXELS, require_full
+from iibr_core.exports.full_picture import require_full
+from iibr_core.exports.render_settings import MAX_PIXELS
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.formats.lenticular import Calibration, read_calibration
 from iibr_core.scenes.lens_choice import LensChoice

@@ -34,7 +34,7 @@ from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.files import MAX_FILE_BYTES, read_bytes
 from iibr_core.formats.images.avif import avif_depth_file
 from iibr_core.formats.images.file_kinds import Kind
-from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, read_heic_depth
+from iibr_core.formats.images.heic import heic_info, heic_orientation, read_heic_depth
 from iibr_core.formats.images.lfp import read_lfp_depth
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
@@ -205,8 +205,8 @@ def unread_parts(path: Path) -> tuple[str, ...]:
 
     It is meant for photos without known depth, so that a guess is explained. Raises InputError if the file is missing.
     """
-    in_heic = " ".join(heic_auxiliaries(path)).encode() if open_picture(path).kind == "HEIC" else b""
-    parts = _mattes(in_heic) + _unread_in_jpeg(_jpeg_bytes(path))
+    listed = heic_info(path).get("aux") or () if open_picture(path).kind == "HEIC" else ()
+    parts = _mattes(" ".join(map(str, listed)).encode()) + _unread_in_jpeg(_jpeg_bytes(path))
     return tuple(f"{path.name} holds {part}; this is not read." for part in parts)
 
 

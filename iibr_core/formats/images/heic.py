@@ -82,11 +82,6 @@ def heic_orientation(path: Path) -> int:
     return orientation_in(exif_of(heic_info(path).get("exif")))
 
 
-def heic_auxiliaries(path: Path) -> tuple[str, ...]:
-    """Return the types of the auxiliary pictures of a HEIC, but depth and alpha."""
-    return tuple(str(kind) for kind in heic_info(path).get("aux") or {})
-
-
 def _open(path: Path, number: int = 0) -> Any:
     import pi_heif
 

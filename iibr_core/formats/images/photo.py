@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from iibr_core.color import ROWS_AT_ONCE, convert, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
-from iibr_core.formats.images.file_notes import file_notes
+from iibr_core.formats.images.file_notes import file_notes, tile_note
 from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import CUT_OFF, Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, small_picture, source_size
 from iibr_core.formats.images.side_by_side import left_picture
-from iibr_core.formats.images.tiles import tile_note
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo, image_size
@@ -112,7 +111,7 @@ def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
     """
     source = left_picture(path)
     is_whole_jpeg = source.part is None and open_picture(path).kind == "JPEG"
-    small = small_picture(path, within, is_smoothed=True) if is_whole_jpeg else None
+    small = small_picture(path, within) if is_whole_jpeg else None
     if small is not None:
         return small
     size = source_size(source)
