@@ -164,7 +164,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
             "aperture": lens.aperture_diameter,
             "range": lens.focus_range,
             "tilt": lens.focus_tilt,
-            "shape": _page_shape(lens.aperture_shape),
+            "shape": asdict(optics.ApertureShape() if lens.aperture_shape.kind == "mask" else lens.aperture_shape),
             "highlights": lens.highlight_recovery,
         },
         "numbers": page_numbers(),
@@ -180,11 +180,6 @@ def page_numbers() -> dict[str, Any]:
 
 def _is_number(name: str, value: Any) -> bool:
     return name.isupper() and (isinstance(value, int | float) or name == "SQRT_STEPS")
-
-
-def _page_shape(shape: optics.ApertureShape) -> dict[str, Any]:
-    """Return a shape without the picture of a mask, which pages do not have: their lens is then a disc."""
-    return asdict(optics.ApertureShape() if shape.kind == "mask" else shape)
 
 
 def _json(value: Any) -> str:

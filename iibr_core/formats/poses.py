@@ -17,7 +17,7 @@ from iibr_core.formats.cameras import MAX_POSES, NamedCamera, require_count, siz
 from iibr_core.formats.colmap import model_in, read_colmap
 from iibr_core.formats.files import MAX_PART_BYTES, PARSE_ERRORS, parsing, printable, read_text, stays_within
 from iibr_core.formats.images.open_picture import open_picture
-from iibr_core.formats.maps.npy import read_array
+from iibr_core.formats.maps.npy import read_named_array
 from iibr_core.types import Camera, ImageSize, InputError
 
 MAX_DISTORTION = 1e-3
@@ -60,7 +60,10 @@ def read_named_poses(path: Path) -> tuple[NamedCamera, ...]:
     A folder is searched for either of them, else for COLMAP's model (sorted by picture).
     """
     if path.is_dir():
-        return _read_folder(path)
+        found = poses_in(path)
+        if found is None:
+            raise InputError(f"{path}: holds neither poses_bounds.npy nor transforms.json nor a COLMAP model")
+        return read_colmap(found) if found.is_dir() else read_named_poses(found)
     if path.suffix.lower() == ".npy":
         return tuple(NamedCamera("", camera) for camera in read_llff_poses(path))
     if path.suffix.lower() == ".json":
@@ -82,20 +85,13 @@ def poses_in(folder: Path) -> Path | None:
     return model_in(folder)
 
 
-def _read_folder(folder: Path) -> tuple[NamedCamera, ...]:
-    path = poses_in(folder)
-    if path is None:
-        raise InputError(f"{folder}: holds neither poses_bounds.npy nor transforms.json nor a COLMAP model")
-    return read_colmap(path) if path.is_dir() else read_named_poses(path)
-
-
 def read_llff_poses(path: Path) -> tuple[Camera, ...]:
     """Return the cameras of poses_bounds.npy (Mildenhall et al. 2019) with their depth ranges.
 
     A row holds a 3x5 matrix (camera-to-world rotation with columns down, right and backwards; position; height, width,
     focal length), then the least and greatest depth.
     """
-    stored = read_array(path, 17 * MAX_POSES)
+    stored, _ = read_named_array(path, 17 * MAX_POSES)
     if stored.ndim != 2 or stored.shape[1] != 17 or stored.dtype.kind != "f":
         raise InputError(f"{path}: holds no poses; N rows of 17 numbers are expected")
     require_count(path, len(stored))

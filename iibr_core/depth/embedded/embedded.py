@@ -35,7 +35,7 @@ from iibr_core.formats.files import MAX_FILE_BYTES, read_bytes
 from iibr_core.formats.images.avif import avif_depth_file
 from iibr_core.formats.images.file_kinds import Kind
 from iibr_core.formats.images.heic import heic_info, heic_orientation, read_heic_depth
-from iibr_core.formats.images.lfp import read_lfp_depth
+from iibr_core.formats.images.lfp import open_lfp
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture import upright
@@ -256,7 +256,8 @@ def _in_heic(path: Path) -> EmbeddedDepth | None:
 
 
 def _in_lfp(path: Path) -> EmbeddedDepth | None:
-    depth = read_lfp_depth(path)
+    lfp = open_lfp(path)
+    depth = None if lfp is None else lfp.depth
     return None if depth is None else EmbeddedDepth(DepthEstimate(-depth, "inverse depth"), "Lytro")
 
 

@@ -73,30 +73,39 @@ class Header(NamedTuple):
         return self.texts.get(name, "")
 
 
-def oiio_header(path: Path, number: int) -> Header:
-    """Return the header of a picture that OpenImageIO reads; Pillow reads further ones of a file."""
-    if number:
-        return pillow_header(path, number)
+def oiio_header(path: Path) -> Header:
+    """Return the header of a picture that OpenImageIO reads."""
     spec = _open(path).spec()
     texts = {name: text_attribute(spec, name) for name in TEXT_NAMES}
     return Header(ImageSize(spec.height, spec.width), int(spec.get_int_attribute("Orientation", 1)), texts)
 
 
-def pillow_header(path: Path, number: int) -> Header:
+def pillow_header(path: Path, number: int = 0) -> Header:
     """Return the header of an AVIF, or of a further picture in a file."""
     with _open_with_pillow(path, number) as image:
         return Header(ImageSize(image.height, image.width), orientation_in(image.getexif()))
 
 
-def decode_avif(path: Path, number: int) -> Picture:
+def decode_by_pillow(path: Path, number: int = 0) -> Picture:
     """Decode an AVIF, or a further picture in a file."""
     with _open_with_pillow(path, number) as image:
         return picture_of(image)
 
 
-def decode_other(path: Path, number: int) -> Picture:
-    """Decode a picture of any kind that OpenImageIO reads, or a further picture in a file."""
-    return decode_avif(path, number) if number else _decode_with_oiio(path)
+def decode_by_oiio(path: Path) -> Picture:
+    """Decode a picture of any kind that OpenImageIO reads."""
+    source = _open(path)
+    spec, stored = source.spec(), _stored(path, source.spec())
+    values: NDArray[Any] = np.empty((spec.height, spec.width, stored.channels), stored.dtype)
+    first, is_cut_off = 0, False
+    for rows, ends_before in _read_rows(path, source, stored):  # all at once would take the memory twice
+        is_cut_off |= ends_before
+        values[first : first + len(rows)] = rows
+        first += len(rows)
+    colors = values[..., : stored.colors]
+    wide = colors if stored.dtype in WIDE_TYPES.values() else None
+    alpha = opaque_as_none(_narrowed(values[..., stored.alpha_at])) if stored.alpha_at >= 0 else None
+    return Picture(_narrowed(colors), alpha, wide=wide, is_cut_off=is_cut_off, **_facts(spec))
 
 
 def oiio_bands(path: Path) -> Iterator[Picture]:
@@ -107,7 +116,7 @@ def oiio_bands(path: Path) -> Iterator[Picture]:
         facts = _facts(spec)
         yield from (Picture(rows, is_cut_off=cut, **facts) for rows, cut in _read_rows(path, source, stored))
     else:
-        yield _decode_with_oiio(path)
+        yield decode_by_oiio(path)
 
 
 def open_header(path: Path) -> Any | None:
@@ -157,21 +166,6 @@ def _open_with_pillow(path: Path, number: int) -> Iterator[Image]:
         with open_with_pillow(path, ("JPEG",)) as image:
             image.seek(number)
             yield image
-
-
-def _decode_with_oiio(path: Path) -> Picture:
-    source = _open(path)
-    spec, stored = source.spec(), _stored(path, source.spec())
-    values: NDArray[Any] = np.empty((spec.height, spec.width, stored.channels), stored.dtype)
-    first, is_cut_off = 0, False
-    for rows, ends_before in _read_rows(path, source, stored):  # all at once would take the memory twice
-        is_cut_off |= ends_before
-        values[first : first + len(rows)] = rows
-        first += len(rows)
-    colors = values[..., : stored.colors]
-    wide = colors if stored.dtype in WIDE_TYPES.values() else None
-    alpha = opaque_as_none(_narrowed(values[..., stored.alpha_at])) if stored.alpha_at >= 0 else None
-    return Picture(_narrowed(colors), alpha, wide=wide, is_cut_off=is_cut_off, **_facts(spec))
 
 
 def _narrowed(values: NDArray[Any]) -> NDArray[Any]:

@@ -48,7 +48,10 @@ class LfpPictures:
 
 @dataclass(frozen=True, eq=False)
 class Lfp:
-    """Contents of a processed file. pictures: None where it holds the map only. depth: (h, w), None without a map."""
+    """Contents of a processed file.
+
+    pictures: None where it holds the map only. depth: (h, w) of lambda, small is near; None without a map.
+    """
 
     pictures: LfpPictures | None
     depth: FloatImage | None
@@ -80,12 +83,6 @@ def read_lfp(path: Path) -> Picture:
     frames = _film(path, pictures) if pictures.frames else _decoded(path, pictures)
     pixels = next(frames) if depth is None or len(pictures.focus) < 2 else _in_focus(frames, pictures, depth)
     return Picture(np.ascontiguousarray(pixels))
-
-
-def read_lfp_depth(path: Path) -> FloatImage | None:
-    """Return the map (h, w) of lambda, small is near; None without."""
-    lfp = open_lfp(path)
-    return None if lfp is None else lfp.depth
 
 
 def _pictures_and_depth(path: Path) -> tuple[LfpPictures, FloatImage | None]:

@@ -10,7 +10,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from iibr_core.formats.files import read_bytes, stamp_of
-from iibr_core.formats.images.decode import Header, decode_avif, decode_other, oiio_bands, oiio_header, pillow_header
+from iibr_core.formats.images.decode import (
+    Header,
+    decode_by_oiio,
+    decode_by_pillow,
+    oiio_bands,
+    oiio_header,
+    pillow_header,
+)
 from iibr_core.formats.images.file_kinds import RAW, START_BYTES, Kind, kind_of
 from iibr_core.formats.images.heic import heic_size, read_heic
 from iibr_core.formats.images.lfp import lfp_size, read_lfp
@@ -25,24 +32,24 @@ REMEMBERED = 8
 
 
 class Reader(NamedTuple):
-    """Functions that read a kind of pictures. number: of the picture in its file, 0 is the one that programs show."""
+    """Functions that read the first picture of a file, which every program shows."""
 
-    header: Callable[[Path, int], Header]
-    decode: Callable[[Path, int], Picture]
+    header: Callable[[Path], Header]
+    decode: Callable[[Path], Picture]
 
 
-def _refuse_raw(path: Path, number: int) -> Header:
+def _refuse_raw(path: Path) -> Header:
     raise InputError(f"{path}: is {RAW.name}; {RAW.way_out}")
 
 
 READERS: dict[Kind, Reader] = {
-    "HEIC": Reader(lambda path, number: Header(heic_size(path, number)), read_heic),  # libheif turns it upright
-    "Lytro": Reader(lambda path, number: Header(lfp_size(path)), lambda path, number: read_lfp(path)),
+    "HEIC": Reader(lambda path: Header(heic_size(path)), read_heic),  # libheif turns it upright
+    "Lytro": Reader(lambda path: Header(lfp_size(path)), read_lfp),
     "Record3D": Reader(recording_header, decode_recording),
-    "AVIF": Reader(pillow_header, decode_avif),
-    "RAW": Reader(_refuse_raw, decode_other),
-    "JPEG": Reader(oiio_header, decode_other),
-    "other": Reader(oiio_header, decode_other),
+    "AVIF": Reader(pillow_header, decode_by_pillow),
+    "RAW": Reader(_refuse_raw, decode_by_oiio),
+    "JPEG": Reader(oiio_header, decode_by_oiio),
+    "other": Reader(oiio_header, decode_by_oiio),
 }
 
 
@@ -60,7 +67,7 @@ class OpenPicture:
     @cached_property
     def header(self) -> Header:
         """Header of the first picture."""
-        return READERS[self.kind].header(self.path, 0)
+        return READERS[self.kind].header(self.path)
 
     @property
     def size(self) -> ImageSize:
@@ -90,27 +97,27 @@ class OpenPicture:
         """Exif and XMP, and the number of pictures of an animation; nothing where the file is damaged."""
         return metadata_in(self.path, self.kind)
 
-    def size_of(self, number: int) -> ImageSize:
-        """Return the size, as stored, of a picture in the file."""
-        return READERS[self.kind].header(self.path, number).size if number else self.size
-
-    def orientation_of(self, number: int) -> int:
-        """Return the orientation of a picture in the file."""
-        return READERS[self.kind].header(self.path, number).orientation if number else self.orientation
+    def header_of(self, number: int) -> Header:
+        """Return the header of a picture in the file."""
+        if number == 0:
+            return self.header
+        return Header(heic_size(self.path, number)) if self.kind == "HEIC" else pillow_header(self.path, number)
 
     def decode(self, number: int = 0) -> Picture:
         """Read a picture as its file stores it: without conversion of its colours, and not turned by its orientation.
 
         Palettes and CMYK become RGB. number: the picture within the file; 0 is the one that every program shows.
         """
-        return READERS[self.kind].decode(self.path, number)
+        if number == 0:
+            return READERS[self.kind].decode(self.path)
+        return read_heic(self.path, number) if self.kind == "HEIC" else decode_by_pillow(self.path, number)
 
     def bands(self) -> Iterator[Picture]:
         """Yield the first picture from top to bottom, some rows at a time where that saves memory.
 
         Files with alpha or linear light, and those that OpenImageIO does not read, come as one.
         """
-        return oiio_bands(self.path) if READERS[self.kind].decode is decode_other else iter([self.decode()])
+        return oiio_bands(self.path) if READERS[self.kind].decode is decode_by_oiio else iter([self.decode()])
 
 
 def open_picture(path: Path) -> OpenPicture:

@@ -52,13 +52,13 @@ def source_size(source: PictureSource) -> ImageSize:
     """Return the size from the file's header: of a part as shown, of a whole picture as stored, not upright."""
     if source.shown_size is not None:
         return source.shown_size
-    return open_picture(source.path).size_of(source.number) if source.part is None else source.part.size
+    return open_picture(source.path).header_of(source.number).size if source.part is None else source.part.size
 
 
 def shown_size(source: PictureSource) -> ImageSize:
     """Return the size from the file's header, as shown: a whole picture is turned by its orientation."""
-    picture, size = open_picture(source.path), source_size(source)
-    is_turned = source == source.whole and picture.orientation_of(source.number) >= 5
+    size = source_size(source)
+    is_turned = source == source.whole and open_picture(source.path).header_of(source.number).orientation >= 5
     return ImageSize(size.width, size.height) if is_turned else size
 
 

@@ -45,13 +45,13 @@ def read_recording(path: Path) -> Recording:
         return Recording(photo, distances, size, float(stated["K"][0]), int(stated["w"]), len(numbers))
 
 
-def recording_header(path: Path, number: int) -> Header:
+def recording_header(path: Path) -> Header:
     """Return the header of the first frame's picture."""
     with open_with_pillow(path, ("JPEG",), read_recording(path).photo) as image:
         return Header(ImageSize(image.height, image.width), orientation_in(image.getexif()))
 
 
-def decode_recording(path: Path, number: int) -> Picture:
+def decode_recording(path: Path) -> Picture:
     """Decode the first frame's picture."""
     recording = read_recording(path)
     with open_with_pillow(path, ("JPEG",), recording.photo) as image:

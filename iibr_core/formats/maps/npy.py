@@ -15,11 +15,6 @@ USUAL_NAMES = (
 """Names of the array that is read from an archive of several arrays, the best first."""
 
 
-def read_array(path: Path, max_values: int) -> NDArray[Any]:
-    """Return the array of an NPY file, read-only, or the map in an NPZ archive."""
-    return read_named_array(path, max_values)[0]
-
-
 def read_named_array(path: Path, max_values: int) -> tuple[NDArray[Any], str]:
     """Return the array of an NPY file, read-only, or the map in an NPZ archive; and its name there, "" without."""
     require_file(path)
