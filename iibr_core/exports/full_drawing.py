@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import stored_from_encoded
 from iibr_core.exports.full_picture import FullPicture, encode_light
 from iibr_core.exports.render_settings import MAX_PIXELS, LensTile, RenderSettings
 from iibr_core.exports.source import Draw
+from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.large_photo import complete_fills, hidden_of_photo, load_large

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.beyond.hidden_surfaces import HiddenSurface
-from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.exports.web_streams import SMALL_SPEED, Stream, chroma_of, encode_levels, luma_of
 from iibr_core.formats.images.color_profile import icc_profile
+from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.formats.maps.resample import nearest_pixels
 from iibr_core.types import (
     DISPLAY_P3,

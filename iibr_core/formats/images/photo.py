@@ -20,8 +20,8 @@ from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import CUT_OFF, Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, small_picture, source_size
+from iibr_core.formats.images.resized_light import average_areas
 from iibr_core.formats.images.side_by_side import left_picture
-from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo, image_size
 
@@ -216,34 +216,6 @@ def _averaged(
         rows = slice(first - kept_from, last - kept_from)
         alpha = None if kept.alpha is None else kept.alpha[rows]
         light = linear_light(replace(kept, pixels=kept.pixels[rows], alpha=alpha))
-        _average_areas(light, row_step, top, first, result[top:bottom])
+        area = top * row_step - first, 0.0, (bottom - top) * row_step, float(stored_size.width)
+        average_areas(light, area, 0, bottom - top, result[top:bottom])
     return result, kept.is_cut_off
-
-
-@kernel
-def _average_areas(light, row_step, top, first_row, result):
-    """Average light (h, W, 3) over the area of each pixel of result (m, w, 3).
-
-    Row i of the whole result covers rows i * row_step to (i + 1) * row_step of the whole picture. top: first row of
-    `result` within the whole. first_row: first row of `light` within the whole.
-    """
-    column_step = light.shape[1] / result.shape[1]
-    for y in range(result.shape[0]):
-        # Areas are exact: border rows and columns count by the share that lies inside.
-        y0 = (top + y) * row_step - first_row
-        y1 = min(y0 + row_step, float(light.shape[0]))
-        for x in range(result.shape[1]):
-            x0 = x * column_step
-            x1 = min(x0 + column_step, float(light.shape[1]))
-            red, green, blue, area = 0.0, 0.0, 0.0, 0.0
-            for row in range(max(int(y0), 0), min(math.ceil(y1), light.shape[0])):
-                covered_rows = min(y1, row + 1.0) - max(y0, float(row))
-                for column in range(int(x0), min(math.ceil(x1), light.shape[1])):
-                    weight = covered_rows * (min(x1, column + 1.0) - max(x0, float(column)))
-                    red += weight * light[row, column, 0]
-                    green += weight * light[row, column, 1]
-                    blue += weight * light[row, column, 2]
-                    area += weight
-            result[y, x, 0] = red / area
-            result[y, x, 1] = green / area
-            result[y, x, 2] = blue / area

@@ -3,7 +3,7 @@ import pytest
 from scipy import ndimage
 
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
-from iibr_core.beyond.resized_light import mean_of_areas
+from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.method.light_field import view_maker
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer, finish

@@ -7,10 +7,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene

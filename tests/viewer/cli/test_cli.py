@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS

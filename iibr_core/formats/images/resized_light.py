@@ -24,13 +24,16 @@ def mean_of_areas(
     if image_size(light) == size and area == everything:
         return light
     means = np.empty((*size, 3), np.float32)
-    in_bands(lambda first, last: _mean_of_areas(light, area, first, last, means), size)
+    in_bands(lambda first, last: average_areas(light, area, first, last, means), size)
     return means
 
 
 @kernel
-def _mean_of_areas(light, area, first, last, means):
-    """Fill rows [first, last) of means; pixels count by the share of them that lies in the area."""
+def average_areas(light, area, first, last, means):
+    """Fill rows [first, last) of means (H, W, 3) with means over an area of light (h, w, 3), see `mean_of_areas`.
+
+    Areas are exact: pixels count by the share of them that lies in the area.
+    """
     top, left, height, width = area
     step_y, step_x = height / means.shape[0], width / means.shape[1]
     for row in range(first, last):
