@@ -16,7 +16,7 @@ from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.messages import BETTER_DEPTH, show_progress
 from viewer.cli.option_records import option, output_option, with_option_records
-from viewer.cli.options import Force, Grid, LensOptions, LiteralDisparity, PhotoOptions, require_model
+from viewer.cli.options import Force, LensOptions, LiteralDisparity, PhotoOptions, require_model
 
 MAX_WORKERS = 1024
 DASK = (
@@ -40,7 +40,6 @@ def batch(
     kind_options: KindOptions,
     photo: PhotoOptions,
     literal: LiteralDisparity = False,
-    grid: Grid = None,
     force: Force = False,
 ) -> None:
     """Export every photo of some folders. The same command again makes missing and outdated exports only.
@@ -52,7 +51,7 @@ def batch(
         if workers is not None:
             raise InputError("--workers starts processes here, --dask uses other machines: leave out one of both")
         require_extra("batch", "distributed")
-    source = kind_options.finer(photo.source("", grid, is_literal=literal))
+    source = kind_options.finer(photo.source("", literal))
     require_model(source.depth)
     open_drawn: OpenDrawn | None = None
     if kind.is_drawn:

@@ -39,8 +39,6 @@ def export(
     *,
     scene: shared.SceneOptions,
     literal: shared.LiteralDisparity = False,
-    focus_disparity: shared.FocusDisparity = None,
-    grid: shared.Grid = None,
     force: shared.Force = False,
 ) -> None:
     """Write a scene, as the window shows it, in a format for displays, browsers or other programs.
@@ -48,7 +46,7 @@ def export(
     Example: iibr export photo.png --to quilt --device portrait -o photo.png
     """
     kind = require_kind(context, to)
-    source = kind_options.finer(scene.source(path, grid, focus_disparity, literal))
+    source = kind_options.finer(scene.source(path, literal))
     shared.require_heeded(context, path)
     kinds.require_ending(kind, output)
     inputs = shared.inputs_of_command(context, source)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -12,16 +13,16 @@ import typer
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
 from iibr_core.formats.outputs import check_output_folder
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import InputError
 from viewer.cli import options
 from viewer.cli.messages import print_notes, show_progress
 from viewer.cli.option_records import flag, option, output_option, with_option_records
 
-NOT_FOR_DENSE_FIELDS = options.NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {
+NOT_FOR_DENSE_FIELDS = options.NOT_FOR_LIGHT_FIELDS - {"inpaint"} | {
     "disparity", "disparity_scale", "literal", "gloss",
 }  # fmt: skip
 """Options that have no meaning for views between those of a light field."""
-NOT_FOR_POSES = {"grid", "format", "depth_strength", "with_disparity", "gloss"}
+NOT_FOR_POSES = {"grid", "format", "depth_strength", "focus_disparity", "with_disparity", "gloss"}
 """Options that have a meaning for light fields only."""
 VIEW_FILES = r"view_\d{4,5}\.(png|exr)"
 """Regular expression of the files that --poses writes."""
@@ -33,9 +34,6 @@ def generate(
     path: options.ScenePath,
     output: Annotated[Path, output_option("Folder to write.", "DIR")],
     scene: options.SceneOptions,
-    grid: Annotated[
-        GridShape | None, option("Grid of views: 9 is 9x9.", "N|RxC", parser=options.grid_from_text)
-    ] = None,
     poses: Annotated[
         Path | None,
         option("Cameras that see the photo: poses_bounds.npy, transforms.json or COLMAP's folder.", "FILE"),
@@ -74,17 +72,18 @@ def generate(
 
     if poses is not None:
         options.require_not_given(context, NOT_FOR_POSES, "for light fields only, not for --poses")
-        source = scene.source(path, None)
+        source = scene.source(path)
         check_output_folder(output, options.inputs_of_command(context, source), force, VIEW_FILES)
         write = partial(views_on_disk.write_free_views, source, poses, photo_pose, bool(literal), output)
     else:
+        grid = scene.grid
         if grid is None or photo_pose is not None:
             raise InputError("give --grid for a light field, or --poses for pictures of any cameras")
         is_dense = is_light_field(path)
         if is_dense:
             options.require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
         is_literal = not is_dense and (scene.disparity is not None if literal is None else literal)
-        source = scene.source(path, None if is_dense else grid, is_literal=is_literal)
+        source = replace(scene, grid=None if is_dense else grid).source(path, is_literal)
         check_light_field(output, format, options.inputs_of_command(context, source), force)
         write_views = partial(write_light_field, output, format, grid, with_disparity=with_disparity)
         write = (

@@ -116,14 +116,11 @@ Force = Annotated[bool, flag("--force", "Replace an existing output. Inputs are 
 Grid = Annotated[
     GridShape | None,
     option(
-        "Grid of views, rows x columns: 9 is 9x9. Of a light field, that of its files.",
+        "Grid of views, rows x columns: 9 is 9x9.",
         "N|RxC",
         "chosen by the plan, or found from the files",
         parser=grid_from_text,
     ),
-]
-FocusDisparity = Annotated[
-    float | None, option("Disparity, as given, of the plane that stays still.", "X", parser=number_from_text)
 ]
 LiteralDisparity = Annotated[
     bool, flag("--literal", "Take disparity as given, in px per view step; the plan does not scale it.")
@@ -188,6 +185,10 @@ class DepthOptions:
 class PhotoOptions(DepthOptions):
     """Options of commands that make views of photos."""
 
+    grid: Grid = None
+    focus_disparity: Annotated[
+        float | None, option("Disparity, as given, of the plane that stays still.", "X", parser=number_from_text)
+    ] = None
     depth_strength: Annotated[float, option("Multiply the parallax that the plan chose.", "X")] = 1.0
     max_pixels: MaxPixels = None
     inpaint: Annotated[
@@ -199,15 +200,14 @@ class PhotoOptions(DepthOptions):
         ),
     ] = DEFAULT_INPAINTER
 
-    def source(
-        self, path: Path | str, grid: GridShape | None, focus_disparity: float | None = None, is_literal: bool = False
-    ) -> Source:
+    def source(self, path: Path | str, is_literal: bool = False) -> Source:
         """Return the source to open. Raises InputError if the options contradict each other."""
-        if is_literal and grid is None:
+        if is_literal and self.grid is None:
             raise InputError("--literal takes disparity in px per view step: give the number of views with --grid")
-        if is_literal and (focus_disparity is not None or self.depth_strength != 1):
+        if is_literal and (self.focus_disparity is not None or self.depth_strength != 1):
             raise InputError("--literal takes disparity as given: leave out --depth-strength and --focus-disparity")
-        return Source(str(path), self.choice, grid, focus_disparity, self.max_pixels, self.inpaint, is_literal)
+        made_by = self.grid, self.focus_disparity, self.max_pixels, self.inpaint, is_literal
+        return Source(str(path), self.choice, *made_by)
 
 
 @dataclass(frozen=True)
@@ -238,12 +238,9 @@ class SceneOptions(PhotoOptions):
         right = None if self.right is None else str(self.right.absolute())
         return replace(super().choice, file=file, file_scale=self.disparity_scale, right=right)
 
-    def source(
-        self, path: Path | str, grid: GridShape | None, focus_disparity: float | None = None, is_literal: bool = False
-    ) -> Source:
+    def source(self, path: Path | str, is_literal: bool = False) -> Source:
         """Return the source to open; the grid of a light field is that of its views. See `PhotoOptions.source`."""
-        source = super().source(path, grid, focus_disparity, is_literal)
-        return with_arrangement(source, Arrangement(self.order, grid, self.flip))
+        return with_arrangement(super().source(path, is_literal), Arrangement(self.order, self.grid, self.flip))
 
 
 def with_arrangement(source: Source, arrangement: Arrangement) -> Source:
@@ -374,7 +371,7 @@ def gloss_of(path: Path | None) -> Gloss | None:
     return read_gloss(path)
 
 
-NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} | {"focus_disparity"}
+NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} - {"grid"}
 """Options about how views are made: a light field brings its views. The disparity of its centre view may be given."""
 
 

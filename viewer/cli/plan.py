@@ -12,7 +12,7 @@ from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.scenes.scene import Source
 from viewer.cli.messages import words_of
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import FocusDisparity, Grid, SceneOptions, require_heeded
+from viewer.cli.options import SceneOptions, require_heeded
 
 
 @with_option_records
@@ -20,14 +20,12 @@ def plan(
     context: typer.Context,
     path: Annotated[Path, typer.Argument(metavar="PATH", help="A photo, or a folder or file of views.")],
     scene: SceneOptions,
-    focus_disparity: FocusDisparity = None,
-    grid: Grid = None,
 ) -> None:
     """Show grid, parallax and memory planned for a photo, without making views; of views, what they are recognised as.
 
     Example: iibr plan photo.png --disparity photo.pfm
     """
-    source = scene.source(path, grid, focus_disparity)
+    source = scene.source(path)
     require_heeded(context, path)
     first, *reasons = _lines_of_views(source) if is_light_field(path) else _lines_of_photo(source, scene.depth_strength)
     print(first)

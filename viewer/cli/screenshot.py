@@ -17,7 +17,7 @@ from iibr_core.exports.render_settings import MAX_PIXELS
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.formats.lenticular import Calibration, read_calibration
 from iibr_core.scenes.lens_choice import LensChoice
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ImageSize, InputError
 from viewer.app.picture_files import export_picture, read_settings, require_picture_place, shot_of
@@ -84,8 +84,6 @@ def screenshot(
     file: FileOptions,
     backend: Annotated[Literal["auto", "egl", "osmesa"], option("Source of OpenGL.")] = "auto",
     scene: shared.SceneOptions,
-    focus_disparity: shared.FocusDisparity = None,
-    grid: shared.Grid = None,
     force: shared.Force = False,
 ) -> None:
     """Draw one picture without a display; its settings are saved in it.
@@ -94,7 +92,7 @@ def screenshot(
 
     Example: iibr screenshot photo.png --focus-at 480,620 --f-number 1.8 --blades 7 -o out.png
     """
-    source, depth_strength = scene.source(path, grid, focus_disparity), scene.depth_strength
+    source, depth_strength = scene.source(path), scene.depth_strength
     shared.require_heeded(context, path)
     if full and size is not None:
         raise InputError("--full sets the size of the picture: leave out --size")
@@ -102,20 +100,13 @@ def screenshot(
     form = file.format if display is None else PictureFormat(color_space=SRGB, keeps_position=file.gps)
     settings, note = None, ""
     if like is not None:
-        from viewer.model import saved_settings
-
         settings, given = read_settings(like), shared.given_options(context)
-        if size is None:
-            saved_settings.require_saved_size(settings, like)
-            size = ScreenSize(*settings.size_px)
-        source = saved_settings.source_like(source, settings, given)
+        source, size, note = _like(settings, like, source, size, given)
         depth_strength = depth_strength if "depth_strength" in given else settings.depth_strength
-        note = saved_settings.left_out_note(settings)
     size = size if display is None else ScreenSize(*display.screen[::-1])
     require_picture_place(output, size, shared.inputs_of_command(context, source), force, form)
     shared.require_source(source)
     choice = lens.choice()
-    from iibr_core.formats.images.photo import smaller_note
     from viewer.display.offscreen import OffscreenScene
 
     with OffscreenScene(backend) as viewer:
@@ -134,11 +125,30 @@ def screenshot(
         optics, draws_own = viewer.state.optics, viewer.draws_own_pixels(size)
     export_picture(output, pixels, shot)
     print(output)
-    own_size, view_size = (ImageSize(size.height, size.width) for size in (opened.own_size or opened.size, opened.size))
-    unimportant = smaller_note(own_size, view_size) if draws_own else ""
-    notes = [each for each in opened.notes if each != unimportant]
-    notes += [*lens.limit_notes(optics, opened), *choice.notes(optics, opened)]
-    print_notes(note, *notes, origin=opened.depth_origin)
+    notes = _notes_without_views(opened) if draws_own else opened.notes
+    print_notes(
+        note, *notes, *lens.limit_notes(optics, opened), *choice.notes(optics, opened), origin=opened.depth_origin
+    )
+
+
+def _like(
+    settings: SavedSettings, like: Path, source: Source, size: ScreenSize | None, given: set[str]
+) -> tuple[Source, ScreenSize, str]:
+    """Return source and size of the picture that repeats a saved one, but for given options, and a note on the rest."""
+    from viewer.model import saved_settings
+
+    if size is None:
+        saved_settings.require_saved_size(settings, like)
+    source = saved_settings.source_like(source, settings, given)
+    return source, size or ScreenSize(*settings.size_px), saved_settings.left_out_note(settings)
+
+
+def _notes_without_views(scene: Scene) -> list[str]:
+    """Return the notes on a scene, but for that on the size of its views."""
+    from iibr_core.formats.images.photo import smaller_note
+
+    own_size, view_size = (ImageSize(size.height, size.width) for size in (scene.own_size or scene.size, scene.size))
+    return [note for note in scene.notes if note != smaller_note(own_size, view_size)]
 
 
 def _display(context: typer.Context, calibration: Path | None, output: Path) -> Calibration | None:

@@ -12,7 +12,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from viewer.app.preferences_store import last_opened, user_folder
 from viewer.cli.option_records import option, with_option_records
-from viewer.cli.options import SCENE, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
+from viewer.cli.options import SCENE, SceneOptions, require_heeded, require_source
 from viewer.model import stereo
 from viewer.model.action import Action, do
 from viewer.model.app_state import AppState
@@ -27,8 +27,6 @@ def view(
     path: Annotated[Path | None, typer.Argument(metavar="PATH", help=SCENE, show_default="the demo photo")] = None,
     *,
     scene: SceneOptions,
-    focus_disparity: FocusDisparity = None,
-    grid: Grid = None,
     tracker: Annotated[
         str | None, option("Follow the head: poses from opentrack at this address.", "udp[:HOST][:PORT]", "off")
     ] = None,
@@ -45,7 +43,7 @@ def view(
     Example: iibr view holiday.jpg --disparity holiday.pfm
     """
     path = path.absolute() if path else demo_photo()
-    source = scene.source(path, grid, focus_disparity)
+    source = scene.source(path)
     require_heeded(context, path)
     require_source(source)
     if stereo_mode is not None and calibration is not None:
