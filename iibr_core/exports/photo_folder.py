@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from iibr_core.exports.kinds import EXPORTS
-from iibr_core.formats.light_fields.grids import natural_key
+from iibr_core.formats.files import natural_key
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
 from iibr_core.formats.maps.map_names import FOLDER_OF_MAPS, FOLDER_OF_PHOTOS, map_name, photo_keys
 

@@ -152,3 +152,9 @@ def refuse_bomb(path: Path, decoded_bytes: int) -> None:
             f"{path}: its {stored:,} bytes claim to hold {decoded_bytes / 2**20:,.0f} MiB, as no photo does;"
             " save it again, smaller"
         )
+
+
+def natural_key(path: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts paths by name, numbers by their value."""
+    parts = re.split(r"(\d+)", path.stem.casefold())
+    return [(int(part), "") if part.isdecimal() else (0, part) for part in parts]

@@ -16,7 +16,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from iibr_core.formats.files import entries_of, parsing, read_text
+from iibr_core.formats.files import entries_of, natural_key, parsing, read_text
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
@@ -94,12 +94,6 @@ def read_in_grid(folder: Path, grid: GridShape | None) -> MultiView | None:
         folder, layout, grid, [((k,), path) for k, path in enumerate(pictures)], read_parameters(folder)
     )
     return replace(scene, stated_grid=grid, is_stated=True)
-
-
-def natural_key(path: Path) -> list[tuple[int, str]]:
-    """Return a key that sorts paths by name, numbers by their value."""
-    parts = re.split(r"(\d+)", path.stem.casefold())
-    return [(int(part), "") if part.isdecimal() else (0, part) for part in parts]
 
 
 def _inside(folder: Path) -> Path:
