@@ -1,1 +1,1 @@
-"""Browsers for tests and benchmarks of pages, all with the interface of `page.Page`."""
+"""Browsers for tests of pages, all with the interface of `page.Page`."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tests.browsers.page import DEADLINE_S, PageError, WebDriverPage, as_json, required, run_program, wait_for
+from tests.browsers.page import DEADLINE_S, Page, PageError, as_json, required, run_program, wait_for
 
 NAMES = ("firefox-esr", "firefox")
 PREFERENCES = {
@@ -26,7 +26,7 @@ style.minHeight = style.maxHeight = `${height}px`;
 """
 
 
-class FirefoxPage(WebDriverPage):
+class FirefoxPage(Page):
     """The page of a Firefox, which takes any size."""
 
     def resize(self, width: int, height: int) -> None:

@@ -1,4 +1,4 @@
-"""The interface of a page in any browser, and the browsers that speak WebDriver (https://www.w3.org/TR/webdriver2)."""
+"""A page in a browser that speaks WebDriver (https://www.w3.org/TR/webdriver2), and how browsers are started."""
 
 import base64
 import json
@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,10 +15,7 @@ DEADLINE_S = 100.0
 """Time limit of a condition that always comes true."""
 POLL_S = 0.02
 """Pause between two looks at what a browser does."""
-KEYS = {
-    name: chr(0xE010 + i)
-    for i, name in enumerate(("End", "Home", "ArrowLeft", "ArrowUp", "ArrowRight", "ArrowDown"))
-} | {"Tab": "\ue004", "Enter": "\ue007", "Escape": "\ue00c"}  # fmt: skip
+KEYS = {name: chr(0xE011 + i) for i, name in enumerate(("Home", "ArrowLeft", "ArrowUp", "ArrowRight", "ArrowDown"))}
 """Characters of WebDriver for keys that write none."""
 PNG_END = b"IEND\xaeB`\x82"
 
@@ -30,38 +26,49 @@ class PageError(RuntimeError):
     """An error of a page or of the browser."""
 
 
-class Page(ABC):
-    """A page. Places are CSS pixels from its upper left corner. downloads: folder of the files that it saves."""
+class Page:
+    """A page, driven by WebDriver's commands. Places are CSS pixels from its upper left corner.
 
-    downloads: Path
+    call: runs a command, named as Marionette names it. downloads: folder of the files that the page saves.
+    """
 
-    @abstractmethod
+    SCRIPT = (
+        "const done = arguments[arguments.length - 1]; Promise.resolve().then(() => ({expression}))"
+        ".then(value => done({{ value }}), error => done({{ error: `${{error}}` }}))"
+    )
+
+    def __init__(self, call: Callable[[str, Mapping[str, Any]], Any], downloads: Path) -> None:
+        self.call, self.downloads = call, downloads
+
     def open(self, url: str) -> None:
         """Load a page and wait for its load event."""
+        self.call("Navigate", {"url": url})
 
-    @abstractmethod
     def evaluate(self, expression: str) -> Any:
         """Return the value of a JavaScript expression, awaited. Raises PageError for what it throws."""
+        script = self.SCRIPT.format(expression=expression)
+        answer = self.call("ExecuteAsyncScript", {"script": script, "args": []})
+        if "error" in answer:
+            raise PageError(answer["error"])
+        return answer.get("value")
 
-    @abstractmethod
-    def resize(self, width: int, height: int) -> None:
-        """Set the size of the page in CSS pixels."""
-
-    @abstractmethod
     def screenshot(self) -> bytes:
         """Return what the page shows as a PNG file."""
+        return base64.b64decode(self.call("TakeScreenshot", {"full": False}))
 
-    @abstractmethod
     def press(self, key: str, times: int = 1) -> None:
         """Press and release a key, named as events name it."""
+        kinds = ("keyDown", "keyUp")
+        self._perform("key", [{"type": kind, "value": KEYS.get(key, key)} for _ in range(times) for kind in kinds])
 
-    @abstractmethod
     def drag(self, *places: Place) -> None:
         """Press the left button at the first place, move to the others, and release it; one place is a click."""
+        moves = [{"type": "pointerMove", "x": round(x), "y": round(y), "duration": 0} for x, y in places]
+        down, up = ({"type": kind, "button": 0} for kind in ("pointerDown", "pointerUp"))
+        self._perform("pointer", [moves[0], down, *moves[1:], up])
 
-    @abstractmethod
-    def close(self) -> None:
-        """Close the page."""
+    def _perform(self, kind: str, actions: Sequence[Mapping[str, Any]]) -> None:
+        self.call("PerformActions", {"actions": [{"type": kind, "id": kind, "actions": actions}]})
 
     def wait_until(self, condition: str) -> None:
         """Ask a JavaScript condition once a frame until it holds.
@@ -79,49 +86,6 @@ class Page(ABC):
         file = self.downloads / name
         wait_for(lambda: file.exists() and file.read_bytes().endswith(PNG_END))
         return file.read_bytes()
-
-
-class WebDriverPage(Page):
-    """A page that is driven by WebDriver's commands.
-
-    call: runs a command, named as Marionette names it.
-    """
-
-    SCRIPT = (
-        "const done = arguments[arguments.length - 1]; Promise.resolve().then(() => ({expression}))"
-        ".then(value => done({{ value }}), error => done({{ error: `${{error}}` }}))"
-    )
-
-    def __init__(self, call: Callable[[str, Mapping[str, Any]], Any], downloads: Path) -> None:
-        self.call, self.downloads = call, downloads
-
-    def open(self, url: str) -> None:
-        self.call("Navigate", {"url": url})
-
-    def evaluate(self, expression: str) -> Any:
-        script = self.SCRIPT.format(expression=expression)
-        answer = self.call("ExecuteAsyncScript", {"script": script, "args": []})
-        if "error" in answer:
-            raise PageError(answer["error"])
-        return answer.get("value")
-
-    def screenshot(self) -> bytes:
-        return base64.b64decode(self.call("TakeScreenshot", {"full": False}))
-
-    def press(self, key: str, times: int = 1) -> None:
-        kinds = ("keyDown", "keyUp")
-        self._perform("key", [{"type": kind, "value": KEYS.get(key, key)} for _ in range(times) for kind in kinds])
-
-    def drag(self, *places: Place) -> None:
-        moves = [{"type": "pointerMove", "x": round(x), "y": round(y), "duration": 0} for x, y in places]
-        down, up = ({"type": kind, "button": 0} for kind in ("pointerDown", "pointerUp"))
-        self._perform("pointer", [moves[0], down, *moves[1:], up])
-
-    def _perform(self, kind: str, actions: Sequence[Mapping[str, Any]]) -> None:
-        self.call("PerformActions", {"actions": [{"type": kind, "id": kind, "actions": actions}]})
-
-    def close(self) -> None:
-        self.open("about:blank")
 
 
 @contextmanager

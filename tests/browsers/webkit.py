@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from tests.browsers.page import DEADLINE_S, PageError, WebDriverPage, as_json, required, run_program, wait_for
+from tests.browsers.page import DEADLINE_S, Page, PageError, as_json, required, run_program, wait_for
 
 BROWSERS = ("/usr/lib/*/webkit2gtk-4.1/MiniBrowser", "/usr/lib*/webkit2gtk-4.1/MiniBrowser")
 COMMANDS = {
@@ -28,7 +28,7 @@ GTK_SETTINGS = "[Settings]\ngtk-enable-animations=0\n"
 """Settings by which pages prefer reduced motion."""
 
 
-class WebKitPage(WebDriverPage):
+class WebKitPage(Page):
     """The page of a WebKitGTK."""
 
     def resize(self, width: int, height: int) -> None:

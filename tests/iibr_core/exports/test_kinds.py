@@ -6,7 +6,9 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.kinds import EXPORTS, ExportOptions, require_export_place, with_defaults
+from iibr_core.exports.source import open_for_export
 from iibr_core.formats.outputs import AlreadyThereError
+from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core.exports.conftest import exported
@@ -62,3 +64,7 @@ def test_a_photo_is_written_with_another_number_of_views(source, tmp_path) -> No
         assert many["offsets"][0, 4].tolist() == [-2.0, 2.0]
     folder = exported(source, "hci", tmp_path / "hci", grid=GridShape(2, 2))
     assert len(list(folder.glob("input_Cam*.png"))) == 4
+    kind, given = EXPORTS["npz"], Source(str(folder))
+    opened = open_for_export(kind, ExportOptions(), given, 1.0, LensChoice(), lambda scene: None, None)
+    with np.load(exported(opened, "npz", tmp_path / "copy.npz")) as copied:
+        assert np.isfinite(copied["disparity"]).all(), "a light field from disk has the disparity of its views"

@@ -4,12 +4,14 @@ import pytest
 from scipy.ndimage import binary_erosion
 
 from iibr_core.beyond.lens_slices import slices_of
+from iibr_core.color import convert, srgb_from_linear
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.exports.full_picture import encode_light
 from iibr_core.exports.kinds import ExportOptions, export_kind
 from iibr_core.exports.source import open_for_export, write_export
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import DISPLAY_P3, SRGB, GridShape, InputError
 from tests.iibr_core.exports.conftest import exported
 from tests.viewer.conftest import write_scene
 
@@ -54,6 +56,13 @@ def test_a_tilted_lens_has_its_focus_elsewhere_at_each_border(source, tmp_path):
     optics = {"aperture_diameter": 2.0, "focus_tilt": (0.5, 0.0)}
     radius = values_of(exported(source, "blur", tmp_path / "a.exr", optics))[0]
     np.testing.assert_allclose((disparity - radius)[0, [0, -1]], [-0.5, 0.5], atol=0.01)
+
+
+def test_light_is_brought_to_the_colours_of_a_file():
+    light = np.random.default_rng(0).uniform(0.2, 0.8, (5, 6, 3)).astype(np.float32)
+    assert np.array_equal(encode_light(light, True, DISPLAY_P3, DISPLAY_P3), light)
+    expected = convert(srgb_from_linear(light), SRGB, DISPLAY_P3)
+    np.testing.assert_allclose(encode_light(light, False, SRGB, DISPLAY_P3), 255 * expected, atol=0.51)
 
 
 @pytest.mark.parametrize("ending", [".png", ".tif"])

@@ -139,6 +139,7 @@ def test_a_mesh_is_the_photo_from_its_place(known, tmp_path) -> None:
     shown = known.draw(RenderSettings(Optics(), ScreenSize(96, 64)))
     assert np.abs(texture - shown).mean() < 2
     assert len(behind) == 5
+    assert len(behind[0].faces) < len(photo.faces) / 2, "the far sides of depth edges alone"
     for mesh in behind:
         x, y, z = mesh.vertices.T
         column, row = np.floor(48 - x / z * cameras.focal_px), np.floor(32 + y / z * cameras.focal_px)

@@ -11,7 +11,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.heic import heic_pair
-from iibr_core.formats.images.iso_boxes import boxes
+from iibr_core.formats.images.iso_boxes import associations, boxes
 from iibr_core.formats.images.metadata import ARTIST, PictureMetadata
 from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.images.photo import read_photo
@@ -155,7 +155,8 @@ def test_boxes_of_a_spatial_photo_are_as_apples(tmp_path, size) -> None:
     assert heic_pair(tmp_path / "a.heic") is not None
     top = list(boxes((tmp_path / "a.heic").read_bytes()))
     meta = dict(boxes(dict(top)[b"meta"][4:]))
-    properties = list(boxes(dict(boxes(meta[b"iprp"]))[b"ipco"]))
+    iprp = dict(boxes(meta[b"iprp"]))
+    properties = list(boxes(iprp[b"ipco"]))
     kinds = [kind for kind, _ in properties]
     assert (top[0][0], top[0][1][:4], b"clap" in kinds) == (b"ftyp", b"heic", False)
     configured = [(content[1] & 31, content[16] & 3) for kind, content in properties if kind == b"hvcC"]
@@ -164,6 +165,9 @@ def test_boxes_of_a_spatial_photo_are_as_apples(tmp_path, size) -> None:
     ((group, pair),) = boxes(meta[b"grpl"])
     _, _, count, left, right = struct.unpack(">IIIII", pair)
     assert (group, count, left != right, struct.unpack(">H", meta[b"pitm"][4:])) == (b"ster", 2, True, (left,))
+    held = {item: [properties[k % 128 - 1][1] for k in ks] for item, ks in associations(iprp[b"ipma"])[0].items()}
+    numbers = {item: [struct.unpack(">i", each[20:])[0] for each in ks if len(each) == 24] for item, ks in held.items()}
+    assert numbers == {left: [293], right: [63_000, 293]}, "distance of the cameras in um, and where they are shown"
     means = [np.asarray(picture).mean() for picture in pillow_heif.open_heif(tmp_path / "a.heic")]
     assert means == pytest.approx([eye.mean(), 255 - eye.mean()], abs=2)
 

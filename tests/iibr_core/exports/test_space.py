@@ -60,7 +60,7 @@ def test_the_three_layouts_say_the_same(source, tmp_path) -> None:
     whole = json.loads((folders["nerfstudio"] / "transforms.json").read_text())
     assert (whole["w"], whole["h"], len(whole["frames"])) == (96, 64, 9)
     for frame in whole["frames"]:
-        assert (folders["nerfstudio"] / frame["file_path"]).is_file()
+        assert Image.open(folders["nerfstudio"] / frame["file_path"]).size == (96, 64)
         matrix = np.array(frame["transform_matrix"])
         place = colmap[Path(frame["file_path"]).name] * [1, -1, -1]
         np.testing.assert_allclose(matrix[:3, 3], place, atol=1e-12)

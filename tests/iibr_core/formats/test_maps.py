@@ -12,7 +12,7 @@ from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import read_pfm, write_pfm
 from iibr_core.formats.maps.reader import read_map, read_map_file, read_map_size
-from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
+from iibr_core.formats.maps.resample import SURFACE_SHARE, nearest_pixels, resample_surfaces
 from iibr_core.formats.maps.writer import MAX_PNG_VALUE, write_map
 from iibr_core.types import FloatImage, ImageSize, InputError
 
@@ -51,6 +51,7 @@ def test_resampling_agrees_with_its_slow_twin(size) -> None:
     values[rng.random(values.shape) < 0.2] = np.nan
     expected = resample_slowly(values, ImageSize(*size))
     assert np.allclose(resample_surfaces(values, ImageSize(*size)), expected, 1e-5, equal_nan=True)
+    assert nearest_pixels(np.arange(9)[None], ImageSize(1, 3)).tolist() == [[1, 4, 7]], "the middle ones"
 
 
 @pytest.mark.parametrize("name", ["a.pfm", "a.npy", "a.npz", "a.exr", "a.tif", "a.png"])

@@ -111,7 +111,9 @@ SIDES = {
 
 @pytest.mark.parametrize("orientation", SIDES)
 def test_exif_orientation(tmp_path, orientation):
-    found = np.round(read_photo(write_oiio(tmp_path / "a.tif", RGB, Orientation=orientation)).pixels * 255)
+    path = write_oiio(tmp_path / "a.tif", RGB, Orientation=orientation)
+    found = np.round(read_photo(path).pixels * 255)
+    assert open_picture(path).upright_size == found.shape[:2]
     row_side, column_side = SIDES[orientation]
     edges = {"top": found[0], "bottom": found[-1], "left": found[:, 0], "right": found[:, -1]}
     row, column = edges[row_side], edges[column_side]
@@ -119,8 +121,12 @@ def test_exif_orientation(tmp_path, orientation):
     assert np.array_equal(column if row_side in ("left", "top") else column[::-1], RGB[:, 0])
 
 
-def test_focal_length_from_35_mm_equivalent(tmp_path):
-    path = write_oiio(tmp_path / "a.jpg", np.zeros((200, 300, 3), np.uint8), Exif__FocalLengthIn35mmFilm=50)
+def test_focal_length_from_35_mm_equivalent_or_50_degrees(tmp_path):
+    pixels = np.zeros((200, 300, 3), np.uint8)
+    assert read_photo(write_oiio(tmp_path / "b.jpg", pixels)).focal_px == pytest.approx(
+        150 / math.tan(math.radians(25))
+    )
+    path = write_oiio(tmp_path / "a.jpg", pixels, Exif__FocalLengthIn35mmFilm=50)
     assert read_photo(path).focal_px == pytest.approx(50 / FILM_DIAGONAL_MM * math.hypot(200, 300), rel=1e-5)
     smaller = read_photo(path, max_pixels=15_000)
     assert smaller.size == (100, 150)
@@ -134,11 +140,8 @@ def test_focal_length_from_35_mm_equivalent(tmp_path):
 def test_focal_length_from_focal_plane(tmp_path, shape, orientation, unit, unit_mm):
     """The camera took twice as many pixels as are stored, 1000 of them in an inch or centimetre."""
     attributes = {"FocalLength": 20.0, "FocalPlaneXResolution": 1000.0, "FocalPlaneResolutionUnit": unit}
-    attributes = {f"Exif__{name}": value for name, value in attributes.items()}
-    pixels = np.zeros((*shape, 3), np.uint8)
-    path = write_oiio(
-        tmp_path / "a.jpg", pixels, Orientation=orientation, Exif__PixelXDimension=2 * shape[1], **attributes
-    )
+    attributes = {f"Exif__{name}": value for name, value in {**attributes, "PixelXDimension": 2 * shape[1]}.items()}
+    path = write_oiio(tmp_path / "a.jpg", np.zeros((*shape, 3), np.uint8), Orientation=orientation, **attributes)
     assert read_photo(path).focal_px == pytest.approx(20 * 1000 / unit_mm / 2, rel=1e-4)
 
 

@@ -172,6 +172,9 @@ def test_camera_facts_are_short_texts_for_people(tmp_path):
         ("Exposure", "f/1.78, 1/125 s, ISO 100, 26 mm (35 mm)"),
         ("Taken", "2024-05-06 07:08"),
     )
+    del exif.get_ifd(EXIF)[FOCAL_35]
+    Image.fromarray(patches()).save(tmp_path / "b.jpg", exif=exif)
+    assert dict(camera_facts(read_metadata(tmp_path / "b.jpg")))["Exposure"] == "f/1.78, 1/125 s, ISO 100, 4.25 mm"
     assert camera_facts(PictureMetadata()) == ()
 
 
