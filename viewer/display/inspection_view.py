@@ -104,7 +104,7 @@ class InspectionView:
 
     def draw(self, state: AppState, layout: Layout) -> InspectionTextures:
         """Draw the images that changed and return the names of all."""
-        view, scene, field = self._scene_view, state.scene, self._scene_view.renderer.field
+        view, scene, field = self._scene_view, state.scene, self._scene_view.field
         if scene is None or field is None or layout.frame_px is None or not field.present.any():
             return NO_INSPECTION_TEXTURES
         views, exposure = (view.generation, view.views_uploaded, view.previews), 2.0**state.optics.exposure_stops
@@ -118,7 +118,7 @@ class InspectionView:
 
     def probe(self, state: AppState) -> Probe | None:
         """Return the values under the pointer; None where they are not asked for."""
-        scene, hover, field = state.scene, state.hover, self._scene_view.renderer.field
+        scene, hover, field = state.scene, state.hover, self._scene_view.field
         if scene is None or hover is None or field is None or not state.inspection.shows_values:
             return None
         view = self._scene_view

@@ -9,7 +9,7 @@ from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.scene import MAKING, Scene, SceneReady, SceneRequest, ViewReady
 from iibr_core.types import ViewOffset
-from viewer.gpu.refocus.views_seen import views_seen_by
+from viewer.gpu.refocus.view_sampling import views_seen_by
 
 PicturesOf = Callable[[Scene], Iterable[Optics] | None]
 """Function from a scene to the optics of the pictures that will be drawn of its views, None if any may be."""

@@ -19,11 +19,11 @@ from iibr_core.scenes.scene_gloss import GlossRequest, gloss_request
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
-from viewer.display.snapshot import SceneSnapshot
+from viewer.display.snapshot import SceneSnapshot, field_of
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import box_around
+from viewer.gpu.light_field_texture import LightFieldTexture, box_around
 from viewer.gpu.refocus.picture_renderer import Renderer
-from viewer.gpu.refocus.views_seen import views_seen
+from viewer.gpu.refocus.view_sampling import views_seen
 from viewer.model.app_state import AppState
 from viewer.model.window import DrawReport
 
@@ -66,20 +66,23 @@ class Picture:
 class SceneView:
     """Holds the renderer and the views of the open scene.
 
-    generation: number of the worker's job that made the views. previews: number of changes by edited depth, gloss and
-    free cameras. views_uploaded: number of uploads. pictures_drawn: number of pictures. picture_drawn: record of the
-    last picture, None before the first. centre: the centre view, None before anything is open.
+    field: the stored views, None before the first. generation: number of the worker's job that made the views.
+    previews: number of changes by edited depth, gloss and free cameras. views_uploaded: number of uploads.
+    pictures_drawn: number of pictures. picture_drawn: record of the last picture, None before the first. centre: the
+    centre view, None before anything is open.
     """
 
     def __init__(self, gl: GLContext) -> None:
         self._gl = gl
         self.renderer = Renderer(gl)
+        self.field: LightFieldTexture | None = None
         self.generation = self.views_uploaded = self.pictures_drawn = self.previews = 0
         self.loaded: LoadedPhoto | None = None
         self.centre: ViewUpdate | None = None
         self.picture_drawn: Picture | None = None
         self._scene: Scene | None = None
         self._fallback_view: ViewUpdate | None = None
+        self._fallback: LightFieldTexture | None = None
         self._gloss: GlossMaps | None = None
         self._is_preview = self._is_edited = self._holds_picture = self._is_settled = False
         self._seen: frozenset[tuple[int, int]] | None = None
@@ -111,26 +114,31 @@ class SceneView:
 
         Raises InputError if the graphics card has no room.
         """
-        scene, centre, field = self._scene, self.centre, self.renderer.field
+        scene, centre, field = self._scene, self.centre, self._stored
         assert scene is not None
         assert centre is not None
-        assert field is not None
         shown = self._disparities.get(CENTRE) if self._is_preview else None
         differs = None if shown is None else shown != disparity
         self._is_edited = True
         if differs is None or field.is_shared or _is_beyond(disparity[differs], field.range_px):
             self._show_alone(scene, replace(centre, is_final=True), disparity, self._gloss)
         elif differs.any():
-            self.renderer.change_disparity(*scene.grid.centre, disparity, box_around(differs))
+            field.change_disparity(*scene.grid.centre, disparity, box_around(differs))
         self._disparities = {CENTRE: disparity}
-        self.previews += 1
+        self._draw_again()
 
     def show_fallback(self, view: ViewUpdate | None) -> None:
         """Show this view, which has a disparity, in place of the scene's views; None shows these again."""
         if view is not None or self._fallback_view is not None:
-            self._fallback_view = view
-            self.renderer.show_fallback(view)
-            self.previews += 1
+            if self._fallback is not None:
+                self._fallback.release()
+            self._fallback_view, self._fallback = view, None
+            if view is not None:
+                field = self._stored
+                size = field.width, field.height, field.hdr
+                self._fallback = LightFieldTexture(self._gl.ctx, field.grid, *size, with_disparity=True, is_single=True)
+                self._fallback.upload(*field.grid.centre, view.colors, view.disparity)
+            self._draw_again()
 
     def gloss_request(self, gloss: Gloss | None) -> GlossRequest | None:
         """Return the request for the maps that this gloss needs, None if they are known."""
@@ -142,15 +150,15 @@ class SceneView:
         """Show gloss with these maps from now on, unless they are of another scene."""
         if self.centre is not None and maps.disparity is self.centre.disparity:
             self._gloss = maps
-            self.renderer.set_gloss(maps)
-            self.previews += 1
+            self._stored.set_gloss(maps)
+            self._draw_again()
 
     def take_hidden(self, surface: HiddenSurface | None) -> None:
         """Show this surface behind the photo's through an open lens from now on; None changes nothing."""
         if surface is not None:
             self._hidden = surface
-            self.renderer.set_hidden(surface)
-            self.previews += 1
+            self._stored.set_hidden(surface)
+            self._draw_again()
             self._holds_picture = True  # until the first pass with the surface
 
     def add(self, view: ViewUpdate) -> None:
@@ -163,7 +171,7 @@ class SceneView:
             return  # uploaded when the scene was opened
         if self._is_preview:
             self._open_field(scene, self._gloss)
-            self.renderer.upload_view(*scene.grid.centre, centre.colors, centre.disparity)
+            self._stored.upload(*scene.grid.centre, centre.colors, centre.disparity)
             self._is_preview, self._final_seen = False, 0  # what was drawn of the picture went with its field
         self._waiting.append(view)
         self._keep_for_picking(scene, view)
@@ -178,13 +186,13 @@ class SceneView:
 
         A present view is not replaced while another holder draws a picture of the views.
         """
-        end, field = time.perf_counter() + budget_s, self.renderer.field
+        end = time.perf_counter() + budget_s
         while self._waiting and time.perf_counter() < end:
             view = self._waiting[0]
-            if (view.row, view.column) in self._is_final and field is not None and field.is_shared:
+            if (view.row, view.column) in self._is_final and self._stored.is_shared:
                 break
             self._waiting.popleft()
-            self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
+            self._stored.upload(view.row, view.column, view.colors, view.disparity)
             self.views_uploaded += 1
             at = view.row, view.column
             self._is_final[at] = view.is_final
@@ -274,22 +282,38 @@ class SceneView:
     def release(self) -> None:
         """Free the GL objects."""
         self.renderer.release()
+        for field in (self.field, self._fallback):
+            if field is not None:
+                field.release()
+
+    @property
+    def _stored(self) -> LightFieldTexture:
+        assert self.field is not None, "open first"
+        return self.field
+
+    def _draw_again(self) -> None:
+        """Draw the picture again because its field has changed otherwise than by more views."""
+        self.renderer.show(self._fallback or self._stored)
+        self.previews += 1
 
     def _show_alone(
         self, scene: Scene, centre: ViewUpdate, disparity: FloatImage | None, gloss: GlossMaps | None
     ) -> None:
         """Show the centre view in a field of one view."""
         self._open_field(scene, gloss, is_single=True)
-        self.renderer.upload_view(*scene.grid.centre, centre.colors, disparity)
+        self._stored.upload(*scene.grid.centre, centre.colors, disparity)
         self.views_uploaded, self._is_final = 1, {scene.grid.centre: centre.is_final}
         self._is_preview = True
         self._waiting.clear()
 
     def _open_field(self, scene: Scene, gloss: GlossMaps | None, is_single: bool = False) -> None:
-        size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
-        self.renderer.open_field(scene.grid, *size, scene.color_space, scene.row_step, is_single)
-        self.renderer.set_gloss(gloss)
-        self.renderer.set_hidden(self._hidden)
+        field, before = field_of(self._gl, scene, is_single), self.field
+        field.set_gloss(gloss)
+        field.set_hidden(self._hidden)
+        self.field = field
+        self.renderer.show(self._fallback or field)
+        if before is not None:
+            before.release()
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):

@@ -47,14 +47,19 @@ class SceneSnapshot:
         self.field.release()
 
 
+def field_of(gl: GLContext, scene: Scene, is_single: bool = False) -> LightFieldTexture:
+    """Return an empty field for a scene's views, or for one of them. Raises InputError if the driver cannot hold it."""
+    size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
+    field = LightFieldTexture(gl.ctx, scene.grid, *size, is_single)
+    field.color_space, field.row_step = scene.color_space, scene.row_step
+    return field
+
+
 def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
     """Return a snapshot of a scene that is not shown, with its centre view; the caller stores the other views.
 
     Raises InputError if it does not fit the graphics card.
     """
-    scene, centre = ready.scene, ready.centre
-    size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
-    field = LightFieldTexture(gl.ctx, scene.grid, *size)
-    field.color_space, field.row_step = scene.color_space, scene.row_step
-    field.upload(*scene.grid.centre, centre.colors, centre.disparity)
-    return SceneSnapshot(scene, ready.loaded, centre, field)
+    centre, field = ready.centre, field_of(gl, ready.scene)
+    field.upload(*field.grid.centre, centre.colors, centre.disparity)
+    return SceneSnapshot(ready.scene, ready.loaded, centre, field)

@@ -97,7 +97,9 @@ class StereoView:
         wanted = count if count <= MAX_RENDERERS else 1
         if len(self._renderers) != wanted:
             self.release()
-            self._renderers = [Renderer(self._gl, view.renderer) for _ in range(wanted)]
+            self._renderers = [Renderer(self._gl, view.renderer.programs) for _ in range(wanted)]
+        for renderer in self._renderers:
+            renderer.show(view.renderer.drawn_field)
         level, converged = None, 0
         self._weaver.prepare(weave)
         each_s = budget_s / count + (OVERHEAD_S if wanted < count else 0.0)

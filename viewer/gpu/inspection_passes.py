@@ -17,7 +17,7 @@ from iibr_core.types import SRGB
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.refocus.picture_lens import dolly_of
-from viewer.gpu.render_targets import RenderTarget
+from viewer.gpu.render_targets import RenderTarget, sized
 
 MAX_VIEWS = 128
 """Largest number of views of a row or column of the grid, as in shaders/epi.frag."""
@@ -174,11 +174,7 @@ class InspectionPasses:
 
     def _use_image(self, name: str, size_px: ScreenSize) -> int:
         """Draw into this image from now on; return its texture. Another size replaces it."""
-        image = self._images.get(name)
-        if image is None or image.size_px != size_px:
-            if image is not None:
-                image.release()
-            image = self._images[name] = RenderTarget(self._ctx, size_px, "f1")
+        image = self._images[name] = sized(self._ctx, self._images.get(name), size_px)
         image.framebuffer.use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         return image.texture.glo

@@ -44,8 +44,19 @@ class RenderTarget:
         self.texture.release()
 
 
+def sized(ctx: moderngl.Context, target: RenderTarget | None, size_px: ScreenSize) -> RenderTarget:
+    """Return a target of bytes of this size: the same one if it has the size, else another in its place."""
+    if target is not None and target.size_px == size_px:
+        return target
+    if target is not None:
+        target.release()
+    return RenderTarget(ctx, size_px, "f1")
+
+
 class PictureTargets:
-    """The targets of a picture. light: sum of light, weighted by alpha. image: finished picture, rows bottom-up."""
+    """The targets of a picture. light: sum of light, weighted by alpha. image: finished picture, rows bottom-up; of a
+    pinhole's picture, which an open lens blurs, the disparity that it sees.
+    """
 
     def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, dtype: str = "f1") -> None:
         """dtype: of the image, see `RenderTarget`."""
@@ -57,20 +68,6 @@ class PictureTargets:
         """Free both."""
         self.image.release()
         self.light.release()
-
-
-class PinholeTargets:
-    """The picture of a pinhole, which an open lens blurs. light: sum of light, weighted by alpha. seen: disparity."""
-
-    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize) -> None:
-        self.size_px = ScreenSize(*size_px)
-        self.light = RenderTarget(ctx, size_px, "f4")
-        self.seen = RenderTarget(ctx, size_px, "f4")
-
-    def release(self) -> None:
-        """Free both."""
-        self.light.release()
-        self.seen.release()
 
 
 class TargetCache:

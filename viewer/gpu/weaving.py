@@ -12,7 +12,7 @@ from iibr_core.formats.lenticular import MAX_CELLS, Calibration
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import Program, ProgramCache
-from viewer.gpu.render_targets import RenderTarget
+from viewer.gpu.render_targets import RenderTarget, sized
 from viewer.model.stereo import Weave
 
 
@@ -30,8 +30,8 @@ class Weaver:
         self._columns = math.ceil(math.sqrt(len(weave.eyes)))
         self._tile_px = width, height = weave.eyes[0].size_px
         rows = math.ceil(len(weave.eyes) / self._columns)
-        self._sheet = self._sized(self._sheet, ScreenSize(self._columns * width, rows * height))
-        self.screen = self._sized(self.screen, weave.size_px)
+        self._sheet = sized(self._ctx, self._sheet, ScreenSize(self._columns * width, rows * height))
+        self.screen = sized(self._ctx, self.screen, weave.size_px)
 
     def tile(self, index: int, drawn_px: ScreenSize) -> moderngl.Framebuffer:
         """Return the framebuffer of the sheet, with the part in view that a picture of this size takes."""
@@ -83,13 +83,6 @@ class Weaver:
             pattern=display.pattern,
         )
         return program
-
-    def _sized(self, target: RenderTarget | None, size_px: ScreenSize) -> RenderTarget:
-        if target is not None and target.size_px == size_px:
-            return target
-        if target is not None:
-            target.release()
-        return RenderTarget(self._ctx, size_px, "f1")
 
 
 def show_texture(gl: GLContext, texture: int, size_px: ScreenSize) -> None:

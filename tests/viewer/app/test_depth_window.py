@@ -67,7 +67,7 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer):
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     viewer.send("mouseup", 1)
     until_made(viewer, generation + 1)
-    assert viewer.app.scene_view.renderer.field.present.sum() == 9
+    assert viewer.app.scene_view.field.present.sum() == 9
     made = disparity_of(viewer.app)
     assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
     far = given == FAR

@@ -44,7 +44,7 @@ def test_the_first_picture_comes_before_the_views(open_window, photo_path):
     driver.until(lambda app: app.frames_shown > 0)
     assert icon_sizes(driver) == [], "it would delay the picture"
     driver.until(lambda app: app.scene_view.pictures_drawn > 0)
-    assert driver.app.scene_view.renderer.field.present.sum() <= WAITING_VIEWS
+    assert driver.app.scene_view.field.present.sum() <= WAITING_VIEWS
     assert driver.image().std() > 10
     assert icon_sizes(driver) == [16, 32, 48]
 

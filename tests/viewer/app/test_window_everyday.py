@@ -108,9 +108,9 @@ def test_stopping_keeps_the_views_that_are_there(open_window, photo_path):
     driver.until(lambda app: app.state.progress.done > 3)
     driver.app.do(do(opening.stop))
     driver.until(lambda app: rests(app))
-    made = driver.app.scene_view.renderer.field.present.sum()
+    made = driver.app.scene_view.field.present.sum()
     assert 3 < made < 41 * 41
-    assert driver.app.scene_view.renderer.field.present.sum() == made == len(driver.app.state.views_there)
+    assert driver.app.scene_view.field.present.sum() == made == len(driver.app.state.views_there)
     assert "stopped at" in driver.app.state.progress.doing
 
 

@@ -6,6 +6,7 @@ from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import FAR, NEAR
+from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.model import lens, messages, preferences
 from viewer.model.action import do
 from viewer.model.focal_plane import handle_points, sharp_disparity
@@ -102,7 +103,7 @@ ONLY_PANELS = (
 def test_what_each_edit_rebuilds(viewer, monkeypatch):
     """Optics draw the picture and nothing else; panels draw panels; only depth strength makes the views again."""
     app = viewer.app
-    uploads = count_calls(monkeypatch, app.scene_view.renderer, "upload_view")
+    uploads = count_calls(monkeypatch, LightFieldTexture, "upload")
 
     def cost_of(action):
         before = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation

@@ -46,7 +46,7 @@ def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path):
         light = middles(viewer.picture(is_linear=True))
         assert light.min() < -0.01, "light that sRGB lacks is not cut off where nothing asks for it"
         passes = InspectionPasses(viewer.gl.ctx, viewer.view.renderer.programs)
-        passes.draw_view(viewer.view.renderer.field, 0, 0, "stored", 1.0)
+        passes.draw_view(viewer.view.field, 0, 0, "stored", 1.0)
         assert np.abs(middles(passes.read("stored")[..., :3]) - IN_SRGB).max() <= 3
         passes.release()
         viewer.open(replace(viewer.scene.source, max_pixels=SIDE * SIDE))

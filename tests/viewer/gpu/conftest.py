@@ -25,3 +25,5 @@ def renderer(gl):
     made = Renderer(gl)
     yield made
     made.release()
+    if made.field is not None:
+        made.field.release()

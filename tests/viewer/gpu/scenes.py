@@ -11,6 +11,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
+from viewer.gpu.light_field_texture import LightFieldTexture
 
 
 @dataclass(frozen=True)
@@ -46,13 +47,13 @@ class TwoPlanes:
     def open(self, renderer, grid, with_disparity=True, row_step=1.0):
         """Open an empty field of this scene's size. row_step: distance of rows, in columns."""
         size = self.width, self.height
-        renderer.open_field(grid, *size, hdr=False, with_disparity=with_disparity, row_step=row_step)
+        open_field(renderer, grid, *size, hdr=False, with_disparity=with_disparity, row_step=row_step)
 
     def upload(self, renderer, grid, row, column, with_disparity=True):
         """Upload one view."""
         t, s = grid.offset(row, column)
         colors, disparity = self.view(ViewOffset(renderer.field.row_step * t, s))
-        renderer.upload_view(row, column, colors, disparity if with_disparity else None)
+        renderer.field.upload(row, column, colors, disparity if with_disparity else None)
 
     def fill(self, renderer, grid, with_disparity=True, row_step=1.0):
         """Open the field and upload every view, and the surface behind the centre view's as the outer views show it."""
@@ -63,7 +64,7 @@ class TwoPlanes:
             outer = [ViewOffset(row_step * at.t, at.s) for at in outer_views_of_grid(grid)]
             seen = [SeenBehind(at, *self.view(at), None) for at in outer]
             colors, disparity = self.view(ViewOffset(0.0, 0.0))
-            renderer.set_hidden(hidden_surface(encoded_from_stored(colors), disparity, max(grid), seen))
+            renderer.field.set_hidden(hidden_surface(encoded_from_stored(colors), disparity, max(grid), seen))
 
 
 class PhotoLike(TwoPlanes):
@@ -141,12 +142,21 @@ def first_frame(renderer, optics, scene):
     return renderer.read_image()
 
 
+def open_field(renderer, grid, width, height, hdr=False, with_disparity=True, row_step=1.0):
+    """Let a renderer draw an empty field of this size."""
+    field = LightFieldTexture(renderer.ctx, grid, width, height, hdr, with_disparity)
+    field.row_step = row_step
+    if renderer.field is not None:
+        renderer.field.release()
+    renderer.show(field)
+
+
 def open_views(renderer, grid, colors, disparity):
     """Open a field whose views all have these colours (H, W, 3) and this disparity."""
     height, width = colors.shape[:2]
-    renderer.open_field(grid, width, height, hdr=False, with_disparity=True)
+    open_field(renderer, grid, width, height)
     for at in np.ndindex(*grid):
-        renderer.upload_view(*at, colors, np.full((height, width), disparity, np.float32))
+        renderer.field.upload(*at, colors, np.full((height, width), disparity, np.float32))
 
 
 def rms(image, expected, border=8):

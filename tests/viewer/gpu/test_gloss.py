@@ -9,7 +9,7 @@ from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.gloss.shading import make_gloss_maps, shade
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import open_views, rms
+from tests.viewer.gpu.scenes import open_field, open_views, rms
 from viewer.gpu.inspection_passes import InspectionPasses, Line
 
 GRID = GridShape(3, 3)
@@ -35,7 +35,7 @@ def open_flat(renderer, gloss):
     photo, flat = np.full((HEIGHT, WIDTH, 3), 100, np.uint8), np.full((HEIGHT, WIDTH), 2.0, np.float32)
     open_views(renderer, GRID, photo, flat)
     maps = maps_of(gloss, photo, flat)
-    renderer.set_gloss(maps)
+    renderer.field.set_gloss(maps)
     return photo, maps
 
 
@@ -50,9 +50,9 @@ def shaded(gloss, maps, photo, eye):
 def test_the_photo_with_gloss_is_the_cores(renderer, gloss, infinity):
     photo, disparity = np.full((HEIGHT, WIDTH, 3), 100, np.uint8), bump()
     maps = maps_of(gloss, photo, disparity, infinity)
-    renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
-    renderer.upload_view(1, 1, photo, disparity)
-    renderer.set_gloss(maps)
+    open_field(renderer, GRID, WIDTH, HEIGHT)
+    renderer.field.upload(1, 1, photo, disparity)
+    renderer.field.set_gloss(maps)
     renderer.render(Optics(gloss=gloss), (WIDTH, HEIGHT))
     expected = shaded(gloss, maps, photo, ViewOffset(0.0, 0.0))
     assert rms(expected, photo) > 0.02

@@ -18,7 +18,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
-from tests.viewer.gpu.scenes import TwoPlanes, open_views, rms
+from tests.viewer.gpu.scenes import TwoPlanes, open_field, open_views, rms
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height
@@ -110,10 +110,10 @@ def test_tiny_thin_and_prime_sized_views(renderer, size):
 def test_float16_sums_of_289_views(renderer):
     """Light far beyond white, summed over 17x17 half-float views, does not drift: within two steps of 8 bits."""
     grid, light = GridShape(17, 17), 3.0
-    renderer.open_field(grid, 8, 6, hdr=True, with_disparity=False)
+    open_field(renderer, grid, 8, 6, hdr=True, with_disparity=False)
     encoded = srgb_from_linear(np.full((6, 8, 3), light)).astype(np.float16)
     for at in np.ndindex(17, 17):
-        renderer.upload_view(*at, encoded, None)
+        renderer.field.upload(*at, encoded, None)
     optics = Optics(aperture_diameter=40.0, exposure_stops=math.log2(0.5 / light))
     expected = 255 * srgb_from_linear(np.array(0.5))
     assert np.abs(picture(renderer, optics, (8, 6)) - expected).max() <= 2
@@ -135,12 +135,12 @@ def test_a_grid_of_1x1(renderer, tmp_path, with_disparity):
 def test_a_one_pixel_wire(renderer):
     """Between stored views it is still there, about as bright and as wide as it is."""
     width, height, foreground = 40, 24, 3.0
-    renderer.open_field(GRID, width, height, hdr=False, with_disparity=True)
+    open_field(renderer, GRID, width, height)
     for row, column in np.ndindex(3, 3):
         at = round(20 - foreground * (column - 1))
         colors, disparity = np.full((height, width, 3), 30, np.uint8), np.zeros((height, width), np.float32)
         colors[:, at], disparity[:, at] = 220, foreground
-        renderer.upload_view(row, column, colors, disparity)
+        renderer.field.upload(row, column, colors, disparity)
     for s in (0.0, 1.0, 1 / 3):
         row = picture(renderer, Optics(ViewOffset(0.0, s)), (width, height))[12, :, 0]
         assert row[round(20 - foreground * s)] > 180, s

@@ -10,7 +10,16 @@ from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, Apertu
 from iibr_core.color import linear_from_srgb
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes, eyes_of_pixels, first_frame, open_views, rms, settled, through_lens
+from tests.viewer.gpu.scenes import (
+    TwoPlanes,
+    eyes_of_pixels,
+    first_frame,
+    open_field,
+    open_views,
+    rms,
+    settled,
+    through_lens,
+)
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes()
@@ -90,9 +99,11 @@ def test_highlights_behind_an_edge_count_for_more_too(renderer):
     y, x = np.indices(size[::-1])
     disparity = np.where(np.hypot(y - 32, x - 48) < 14, 6.0, 1.0).astype(np.float32)
     colors = np.where(disparity[..., None] > 2, 60, 255).astype(np.uint8).repeat(3, -1)
-    renderer.open_field(GridShape(1, 1), *size, hdr=False, with_disparity=True)
-    renderer.upload_view(0, 0, colors, disparity)
-    renderer.set_hidden(HiddenSurface(np.ones((*size[::-1], 3), np.float32), np.ones_like(disparity), disparity > 0))
+    open_field(renderer, GridShape(1, 1), *size)
+    renderer.field.upload(0, 0, colors, disparity)
+    renderer.field.set_hidden(
+        HiddenSurface(np.ones((*size[::-1], 3), np.float32), np.ones_like(disparity), disparity > 0)
+    )
     plain, bright = (
         renderer.converged_picture(RenderSettings(replace(optics, highlight_recovery=share), size, is_linear=True))
         for share in (0.0, 1.0)
@@ -107,9 +118,9 @@ def test_nothing_shines_through_a_surface_that_lies_close_before_it(renderer):
     """A dark wall that comes towards the eye, a bright one a little behind it: their discs are nearly the same."""
     size = (96, 64)
     disparity = np.tile(np.linspace(-3, 3, size[0], dtype=np.float32), (size[1], 1))
-    renderer.open_field(GridShape(1, 1), *size, hdr=False, with_disparity=True)
-    renderer.upload_view(0, 0, np.full((*size[::-1], 3), 60, np.uint8), disparity)
-    renderer.set_hidden(HiddenSurface(np.ones((*size[::-1], 3), np.float32), disparity - 0.6, disparity > -9))
+    open_field(renderer, GridShape(1, 1), *size)
+    renderer.field.upload(0, 0, np.full((*size[::-1], 3), 60, np.uint8), disparity)
+    renderer.field.set_hidden(HiddenSurface(np.ones((*size[::-1], 3), np.float32), disparity - 0.6, disparity > -9))
     optics = Optics(aperture_diameter=2.0)
     picture = renderer.converged_picture(RenderSettings(optics, size, is_linear=True))
     dark = float(linear_from_srgb(np.array(60 / 255)))

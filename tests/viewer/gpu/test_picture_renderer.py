@@ -11,7 +11,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close
-from tests.viewer.gpu.scenes import TwoPlanes, psnr, rms, settled, through_lens
+from tests.viewer.gpu.scenes import TwoPlanes, open_field, psnr, rms, settled, through_lens
 
 GRID = GridShape(5, 5)
 CENTRE = ViewOffset(0.0, 0.0)
@@ -28,8 +28,8 @@ def picture(renderer, scene=SCENE, **optics):
 def test_centre_through_a_pinhole_is_the_photo(renderer, tmp_path):
     random = np.random.default_rng(0)
     photo = random.integers(0, 256, (40, 60, 3), dtype=np.uint8)
-    renderer.open_field(GridShape(9, 9), 60, 40, hdr=False, with_disparity=True)
-    renderer.upload_view(4, 4, photo, random.normal(size=(40, 60)).astype(np.float32))
+    open_field(renderer, GridShape(9, 9), 60, 40)
+    renderer.field.upload(4, 4, photo, random.normal(size=(40, 60)).astype(np.float32))
     renderer.render(Optics(focus_disparity=1.5), (60, 40))
     assert_close(renderer.read_image(), photo, ROUNDING, tmp_path)
 
@@ -107,8 +107,8 @@ def test_views_without_disparity_are_sheared_to_the_focus(renderer, tmp_path):
 def test_exposure_and_srgb_of_hdr(renderer):
     ramp = np.geomspace(0.001, 30, 48).astype(np.float16)
     colors = np.repeat(ramp[None, :, None], 4, axis=0).repeat(3, axis=2)
-    renderer.open_field(GridShape(1, 1), 48, 4, hdr=True, with_disparity=False)
-    renderer.upload_view(0, 0, colors, None)
+    open_field(renderer, GridShape(1, 1), 48, 4, hdr=True, with_disparity=False)
+    renderer.field.upload(0, 0, colors, None)
     for stops in (-4.0, 0.0, 2.5):
         renderer.render(Optics(exposure_stops=stops), (48, 4))
         expected = np.clip(srgb_from_linear(linear_from_srgb(ramp.astype(np.float32)) * 2**stops), 0, 1) * 255

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes
+from tests.viewer.gpu.scenes import TwoPlanes, open_field
 from viewer.gpu.refocus.picture_drawing import MAX_TILE_PX, picture_tiles
 
 GRID = GridShape(5, 5)
@@ -112,7 +112,7 @@ def test_another_field_changes_nothing_in_a_picture_that_is_being_drawn(renderer
         assert not drawing.is_done
         return
     expected = renderer.converged_picture(settings)
-    renderer.open_field(GridShape(1, 1), 8, 8, hdr=False, with_disparity=False)
+    open_field(renderer, GridShape(1, 1), 8, 8, with_disparity=False)
     assert not field.is_shared, "the drawing alone holds it"
     drawing.advance()
     drawing.stop()

@@ -9,7 +9,7 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.beyond.picture_quality import EDGE_PASSES, MAX_SOURCES
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes, psnr
+from tests.viewer.gpu.scenes import TwoPlanes, open_field, psnr
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=0.0, radius_px=25.0)
@@ -72,7 +72,7 @@ def test_views_too_large_for_the_driver_leave_the_old_field(renderer, gl):
     SCENE.fill(renderer, GRID)
     before = converged(renderer, WIDE)
     with pytest.raises(InputError, match=r"px exceed"):
-        renderer.open_field(GRID, gl.max_texture_size + 1, 4, hdr=False, with_disparity=False)
+        open_field(renderer, GRID, gl.max_texture_size + 1, 4, with_disparity=False)
     assert np.array_equal(converged(renderer, WIDE), before)
 
 

@@ -16,6 +16,7 @@ from iibr_core.method.light_field import generate
 from iibr_core.types import ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
+from tests.viewer.gpu.scenes import open_field
 
 MIN_DB = {"shelf": 43.4, "fence": 40.4}
 
@@ -35,14 +36,14 @@ def drawn_db(renderer, scene, field):
     """The converged picture against the lens's."""
     optics = Optics(focus_disparity=scene.lens.focus_disparity, aperture_diameter=2 * scene.lens.radius_views)
     height, width = scene.photo.size
-    renderer.open_field(GRID, width, height, hdr=False, with_disparity=field[0, 0].disparity is not None)
+    open_field(renderer, GRID, width, height, with_disparity=field[0, 0].disparity is not None)
     for update in field.values():
-        renderer.upload_view(update.row, update.column, update.colors, update.disparity)
+        renderer.field.upload(update.row, update.column, update.colors, update.disparity)
     if field[0, 0].disparity is not None:
         outer = [(at, field[GRID.index_of(at)]) for at in outer_views_of_grid(GRID)]
         seen = [SeenBehind(at, view.colors, view.disparity, view.inpainted) for at, view in outer]
         radius = scene.lens.radius_views
-        renderer.set_hidden(hidden_surface(scene.photo.pixels, scene.disparity.values, radius, seen))
+        renderer.field.set_hidden(hidden_surface(scene.photo.pixels, scene.disparity.values, radius, seen))
     picture = renderer.converged_picture(RenderSettings(optics, (width, height)))
     return scene.lens_db(picture.astype(np.float32) / np.float32(255))
 

@@ -8,7 +8,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.refocus.picture_lens import lens_of
-from viewer.gpu.refocus.views_seen import views_seen
+from viewer.gpu.refocus.view_sampling import views_seen
 
 SCENE = TwoPlanes(width=8, height=6)
 

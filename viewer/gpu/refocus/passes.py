@@ -31,10 +31,11 @@ Rows = tuple[int, int]
 class ProgressiveAccumulation:
     """A picture being summed up: cameras before camera `at` of pass `pass_index` are drawn, out of `passes` passes.
 
-    lens, size_px: of the picture. passes: of the pinhole's picture, which an open lens then blurs; of the picture
-    itself without slices. samples: cameras of this pass. done: number of cameras drawn in all passes.
+    field, lens, size_px: of the picture. passes: of the pinhole's picture, which an open lens then blurs; of the
+    picture itself without slices. samples: cameras of this pass. done: number of cameras drawn in all passes.
     """
 
+    field: LightFieldTexture
     lens: Lens
     size_px: ScreenSize
     passes: int
@@ -77,7 +78,6 @@ class Passes:
 
     def draw_lens(
         self,
-        field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
         batch: Samples,
         framebuffer: moderngl.Framebuffer,
@@ -89,7 +89,7 @@ class Passes:
         The search for surfaces depends on all cameras of the pass, so the picture does not depend on the batches.
         is_disparity: disparity is written, not light.
         """
-        lens, samples = accumulation.drawn_lens, accumulation.samples
+        field, lens, samples = accumulation.field, accumulation.drawn_lens, accumulation.samples
         assert samples is not None
         has_views_to_warp = bool(field.has_disparity.any())
         program = self._programs.get(

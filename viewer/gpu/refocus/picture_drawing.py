@@ -16,12 +16,10 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator
-from viewer.gpu.refocus.discs import Discs
 from viewer.gpu.refocus.passes import ProgressiveAccumulation
-from viewer.gpu.render_targets import PictureTargets, PinholeTargets
+from viewer.gpu.render_targets import PictureTargets
 
 STEP_S = 0.005
 """Time of a step in seconds; a drag waits for one step at most."""
@@ -70,24 +68,22 @@ class PictureDrawing:
         self,
         gl: GLContext,
         programs: ProgramCache,
-        field: LightFieldTexture,
         whole: ProgressiveAccumulation,
         is_linear: bool,
         color_space: ColorSpace,
     ) -> None:
         """Prepare the drawing.
 
-        field: shared until `stop`; views that it gets later are not drawn. whole: the picture, not begun. is_linear,
-        color_space: see `RenderSettings`.
+        whole: the picture, not begun. Its field is shared until `stop`; views that it gets later are not drawn.
+        is_linear, color_space: see `RenderSettings`.
         """
         width, height = whole.size_px
-        self._discs = Discs(gl.ctx, programs)
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
         self.is_done = self._is_released = self._is_in_steps = False
         self._gl = gl
         self._accumulator = Accumulator(gl.ctx, programs)
-        self._field = field.share()
-        self._whole, self._is_linear, self._color_space = whole, is_linear, color_space
+        self._whole = replace(whole, field=whole.field.share())
+        self._is_linear, self._color_space = is_linear, color_space
         max_px = MAX_OPEN_TILE_PX if whole.lens.slices else gl.max_texture_size
         self._tiles = picture_tiles(whole.size_px, min(max_px, gl.max_texture_size))
         self._tiles_done = 0
@@ -126,8 +122,7 @@ class PictureDrawing:
             self._is_released = True
             self._steps.close()
             self._accumulator.release()
-            self._discs.release()
-            self._field.release()
+            self._whole.field.release()
 
     def _draw(self) -> Generator[None]:
         for tile in self._tiles:
@@ -145,16 +140,12 @@ class PictureDrawing:
         self._current = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
         pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
         if lens.slices:
-            pinhole = PinholeTargets(self._gl.ctx, accumulation.drawn_px)
+            pinhole = PictureTargets(self._gl.ctx, accumulation.drawn_px, "f4")
             stack.callback(pinhole.release)
-            yield from self._accumulator.sum_up_in_steps(self._field, accumulation, pinhole.light.framebuffer, pixels)
-            self._accumulator.draw_disparity(self._field, accumulation, pinhole.seen.framebuffer)
-            yield from self._discs.steps(
-                self._field, lens, pinhole.light.texture, pinhole.seen.texture, targets.light.framebuffer
-            )
+            yield from self._accumulator.sum_up_in_steps(accumulation, pinhole.light.framebuffer, pixels)
+            yield from self._accumulator.open_lens(accumulation, pinhole, targets.light.framebuffer)
         else:
-            target = targets.light.framebuffer
-            yield from self._accumulator.sum_up_in_steps(self._field, accumulation, target, pixels)
+            yield from self._accumulator.sum_up_in_steps(accumulation, targets.light.framebuffer, pixels)
         self._accumulator.passes.present(lens, targets, self._is_linear, self._color_space)
         yield
         self.image[tile.rows, tile.columns] = targets.image.read()

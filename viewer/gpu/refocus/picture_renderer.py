@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -21,12 +21,11 @@ from iibr_core.beyond.picture_quality import BEST_QUALITY, QUALITY_LEVELS, Quali
 from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
+from iibr_core.types import GridShape
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box, LightFieldTexture
+from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator
-from viewer.gpu.refocus.discs import Discs
 from viewer.gpu.refocus.frame_budget import (
     OPEN_FETCHES,
     FrameTimeModel,
@@ -38,11 +37,7 @@ from viewer.gpu.refocus.frame_budget import (
 from viewer.gpu.refocus.passes import ProgressiveAccumulation
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
-from viewer.gpu.render_targets import PictureTargets, PinholeTargets, TargetCache
-
-if TYPE_CHECKING:
-    from iibr_core.beyond.hidden_surfaces import HiddenSurface
-    from iibr_core.gloss.shading import GlossMaps
+from viewer.gpu.render_targets import PictureTargets, TargetCache
 
 
 class Renderer:
@@ -53,94 +48,32 @@ class Renderer:
     last drawing in seconds. level: index of the last picture's quality level.
     """
 
-    def __init__(self, gl: GLContext, shared: Renderer | None = None) -> None:
-        """shared: renderer whose programs and field this one draws with; pictures are then written by `present`."""
-        self.gl, self.ctx, self._shares = gl, gl.ctx, shared
+    def __init__(self, gl: GLContext, programs: ProgramCache | None = None) -> None:
+        """programs: of another renderer; pictures are then written by `present`. None for its own."""
+        self.gl, self.ctx = gl, gl.ctx
         self.field: LightFieldTexture | None = None
         self.passes_shown = self.samples = self.samples_converged = 0
         self.draw_s = 0.0
-        self.programs: ProgramCache = shared.programs if shared else ProgramCache(self.ctx)
+        self._owns_programs, self.programs = programs is None, programs or ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
-        self._discs = Discs(self.ctx, self.programs)
-        self._pinhole: PinholeTargets | None = None
+        self._pinhole: PictureTargets | None = None
         self._opening: Iterator[None] | None = None
-        self._fallback_view: LightFieldTexture | None = None
         self._targets = TargetCache(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
         self._shown_from_pass = self._passes_opened = self.level = 0
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
 
-    @property
-    def drawn_field(self) -> LightFieldTexture:
-        """The field that is drawn, or the view in its place. Raises ValueError before the first."""
-        return self._shares.drawn_field if self._shares else self._fallback_view or self._loaded
+    def show(self, field: LightFieldTexture) -> None:
+        """Draw this field from now on. To be called again when anything but its views has changed."""
+        self.field, self._accumulation = field, None
 
     @property
-    def _loaded(self) -> LightFieldTexture:
+    def drawn_field(self) -> LightFieldTexture:
+        """The field that is drawn. Raises ValueError before the first."""
         if self.field is None:
             raise ValueError("no light field is open")
         return self.field
-
-    def open_field(
-        self,
-        grid: GridShape,
-        width: int,
-        height: int,
-        hdr: bool,
-        with_disparity: bool,
-        color_space: ColorSpace = SRGB,
-        row_step: float = 1.0,
-        is_single: bool = False,
-    ) -> None:
-        """Start an empty light field of this size in place of the one before.
-
-        color_space: of its views. row_step: distance between its rows, in distances between columns. is_single: there
-        is room for one view only.
-
-        Raises InputError if the graphics driver cannot hold it; the field before then stays.
-        """
-        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity, is_single)
-        field.color_space, field.row_step = color_space, row_step
-        if self.field is not None:
-            self.field.release()
-        self.field = field
-        self._accumulation = None
-
-    def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
-        """Add or replace one view; see LightFieldTexture.upload."""
-        self._loaded.upload(row, column, colors, disparity)
-
-    def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
-        """Replace the disparity of the view uploaded last; see LightFieldTexture.change_disparity."""
-        self._loaded.change_disparity(row, column, disparity, box)
-        if not self.is_renewing:
-            self._accumulation = None
-
-    def show_fallback(self, view: ViewUpdate | None) -> None:
-        """Draw this view alone in the field's place, from its middle; None: the field again.
-
-        It has the size of the field's views, a disparity, and sRGB's colours.
-        """
-        if self._fallback_view is not None:
-            self._fallback_view.release()
-            self._fallback_view = None
-        if view is not None:
-            field = self._loaded
-            size = field.width, field.height, field.hdr
-            self._fallback_view = LightFieldTexture(self.ctx, field.grid, *size, with_disparity=True, is_single=True)
-            self._fallback_view.upload(*field.grid.centre, view.colors, view.disparity)
-        self._accumulation = None
-
-    def set_hidden(self, surface: HiddenSurface | None) -> None:
-        """Show this surface behind the centre view's through an open lens; None: no surface."""
-        self._loaded.set_hidden(surface)
-        self._accumulation = None
-
-    def set_gloss(self, maps: GlossMaps | None) -> None:
-        """Use these maps for optics with gloss; None if there are none."""
-        self._loaded.set_gloss(maps)
-        self._accumulation = None
 
     def render(
         self, optics: Optics, size_px: ScreenSize, level: QualityLevel = BEST_QUALITY, part: Rect = WHOLE
@@ -220,7 +153,7 @@ class Renderer:
             return self._start_tile(settings, settings.tile)
         field = self.drawn_field if field is None else field
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
-        return PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space)
+        return PictureDrawing(self.gl, self.programs, whole, settings.is_linear, settings.color_space)
 
     def _start_tile(self, settings: RenderSettings, tile: LensTile) -> PictureDrawing:
         """Return a picture of the tile's own view."""
@@ -238,8 +171,8 @@ class Renderer:
             hidden_scale=tile.hidden_scale,
             behind_eye=tile.behind_eye,
         )
-        whole = ProgressiveAccumulation(lens, settings.size_px, lens.pass_count(field))
-        drawing = PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space)
+        whole = ProgressiveAccumulation(field, lens, settings.size_px, lens.pass_count(field))
+        drawing = PictureDrawing(self.gl, self.programs, whole, settings.is_linear, settings.color_space)
         field.release()
         return drawing
 
@@ -287,17 +220,13 @@ class Renderer:
         return red, green, blue
 
     def release(self) -> None:
-        """Free every GL object."""
-        if self._shares is None:
+        """Free every GL object but the field."""
+        if self._owns_programs:
             self.programs.release()
         self._accumulator.release()
-        self._discs.release()
         if self._pinhole is not None:
             self._pinhole.release()
         self._targets.release()
-        for field in (self.field, self._fallback_view):
-            if field is not None:
-                field.release()
 
     @property
     def _current(self) -> ProgressiveAccumulation:
@@ -319,7 +248,7 @@ class Renderer:
     ) -> ProgressiveAccumulation:
         field = field or self.drawn_field
         lens = replace(lens_of(optics, field, round(size_px[0] / part.width), level), part=part)
-        return ProgressiveAccumulation(lens, ScreenSize(*size_px), lens.pass_count(field))
+        return ProgressiveAccumulation(field, lens, ScreenSize(*size_px), lens.pass_count(field))
 
     def _begin(self, accumulation: ProgressiveAccumulation) -> None:
         self._accumulation, self._opening = accumulation, None
@@ -338,13 +267,13 @@ class Renderer:
             target = self._pinhole_targets(accumulation.drawn_px).light.framebuffer
         else:
             target = self._targets.get(accumulation.size_px).light.framebuffer
-        self._accumulator.sum_up(self.drawn_field, accumulation, target, passes, budget_s, sample_s)
+        self._accumulator.sum_up(accumulation, target, passes, budget_s, sample_s)
 
-    def _pinhole_targets(self, size_px: ScreenSize) -> PinholeTargets:
+    def _pinhole_targets(self, size_px: ScreenSize) -> PictureTargets:
         if self._pinhole is None or self._pinhole.size_px != size_px:
             if self._pinhole is not None:
                 self._pinhole.release()
-            self._pinhole = PinholeTargets(self.ctx, size_px)
+            self._pinhole = PictureTargets(self.ctx, size_px, "f4")
         return self._pinhole
 
     def _open_lens(self, budget_s: float) -> None:
@@ -354,14 +283,7 @@ class Renderer:
             return
         if self._opening is None:
             pinhole, target = self._pinhole_targets(accumulation.drawn_px), self._targets.get(accumulation.size_px)
-            self._accumulator.draw_disparity(self.drawn_field, accumulation, pinhole.seen.framebuffer)
-            self._opening = self._discs.steps(
-                self.drawn_field,
-                accumulation.lens,
-                pinhole.light.texture,
-                pinhole.seen.texture,
-                target.light.framebuffer,
-            )
+            self._opening = self._accumulator.open_lens(accumulation, pinhole, target.light.framebuffer)
         for _ in self._opening:
             if budget_s < math.inf:
                 self.ctx.finish()
@@ -371,7 +293,7 @@ class Renderer:
 
     def _finish(self) -> None:
         self._targets.shown = targets = self._targets.get(self._current.size_px)
-        if self._shares is None:
+        if self._owns_programs:
             self._accumulator.passes.present(self._current.lens, targets)
         self.passes_shown = self._passes_ready
 

@@ -5,6 +5,7 @@ Weights change smoothly with the eye and the aperture, so that nothing jumps whi
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -13,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_sampling import Points, views_in_aperture
-from iibr_core.beyond.optics import ApertureShape
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.beyond.picture_quality import MAX_SOURCES, MIN_WEIGHT
+from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.scenes.lens_limits import clamp_to_grid
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 
 
@@ -56,6 +59,24 @@ def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
     are continuous in the eye, and at a stored view it counts alone. present: (V, U) bool.
     """
     return _cell_corners(eye, grid, present) or _nearest_present(eye, grid, present)
+
+
+def views_seen(optics: Optics, grid: GridShape, has_disparity: bool = True) -> set[ViewOffset] | None:
+    """Return the views of a grid that a converged picture through these optics shows, None for all.
+
+    They are the corners of the eye's cell; an open lens also sees what the outer views show behind the centre view.
+    has_disparity: whether the views have disparity; an open lens adds up views without it.
+    """
+    if optics.dolly != 0 or (optics.aperture_diameter > 0 and not has_disparity):
+        return None
+    corners = {grid.offset(row, column) for row, column, _ in _cell_corners(optics.eye, grid, np.ones(grid, bool))}
+    return corners.union(outer_views_of_grid(grid)) if optics.aperture_diameter > 0 else corners
+
+
+def views_seen_by(pictures: Iterable[Optics], scene: Scene) -> set[ViewOffset] | None:
+    """Return the views that any of these pictures shows, None for all."""
+    seen = [views_seen(optics, scene.grid, scene.has_view_disparity) for optics in pictures]
+    return None if None in seen else set[ViewOffset]().union(*filter(None, seen))
 
 
 def pinhole_samples(sources: list[WeightedView]) -> Samples:
