@@ -35,7 +35,7 @@ def rows_landed_on(rays: RaySet, k: int, matrix: NDArray[np.float64]) -> FloatIm
 
     It is (inf, -inf) for cells without rays. The boxes around the cells in disparity space stay convex.
     """
-    low, high = rays.cells.low[k], rays.cells.high[k]
+    low, high = rays.arrays.low[k], rays.arrays.high[k]
     # Corners of pixels have disparities of the cells around.
     bounds = [_combine_3x3(np.minimum, low)] * 4 + [_combine_3x3(np.maximum, high)] * 4
     v, u = np.indices(low.shape)

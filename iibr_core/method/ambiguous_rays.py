@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from iibr_core.method.candidates import Candidates
 from iibr_core.method.look_up import ShownRays, cubic, cubic_on_surface
-from iibr_core.method.rays import CELL_PX, RayArrays, RaySet
+from iibr_core.method.rays import CELL_PX, RaySet
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.surfaces import SAME_SURFACE_PX
@@ -32,7 +32,7 @@ SEARCH_PX = 3
 BESIDE, DIAGONAL = np.array([(0, 1), (0, -1), (1, 0), (-1, 0)]), np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
 AROUND = np.concatenate([BESIDE, 2 * DIAGONAL, 3 * BESIDE])
 """Offsets (down, right) at which they are looked for."""
-AROUND_DISTANCE = np.hypot(*AROUND.T)
+AROUND_DISTANCE = np.hypot(*AROUND.T).astype(np.float32)
 NOWHERE_PX = 7.0
 """Distance of a surface that lands nowhere around, in pixels, as the transformer was trained."""
 MIN_COLOR_CHANGE = 0.05
@@ -56,19 +56,15 @@ class AmbiguousRays(NamedTuple):
     """Ambiguous rays (N) of one view and their hypotheses (K).
 
     pixel (N, 2): (row, column) in the images. number (N): hypotheses in use, at least 2; the last one in use is the
-    plain look-up: the ray shows the front-most surface as the photo mixed it at its edge. uncovered (N): share of the
-    ray that nothing covers. disparity, source, share, nearest (N, K): share is the closed form's weight, nearest the
-    distance at which the surface lands, in pixels. features (N, K, FEATURES).
+    plain look-up: the ray shows the front-most surface as the photo mixed it at its edge. disparity, source (N, K).
+    features (N, K, FEATURES).
     """
 
     offset: ViewOffset
     pixel: NDArray[np.int64]
     number: NDArray[np.uint8]
-    uncovered: FloatImage
     disparity: FloatImage
     source: NDArray[np.uint8]
-    share: FloatImage
-    nearest: FloatImage
     features: FloatImage
 
     @property
@@ -78,27 +74,7 @@ class AmbiguousRays(NamedTuple):
 
     def chosen(self, rays: NDArray[Any]) -> AmbiguousRays:
         """Return these rays, an index array or a mask (N)."""
-        return self._replace(
-            pixel=self.pixel[rays],
-            number=self.number[rays],
-            uncovered=self.uncovered[rays],
-            disparity=self.disparity[rays],
-            source=self.source[rays],
-            share=self.share[rays],
-            nearest=self.nearest[rays],
-            features=self.features[rays],
-        )
-
-
-class _Landed(NamedTuple):
-    """Some rows of a view. to_view (S, 2): steps from each source to the view. parallax: largest of them."""
-
-    rays: RayArrays
-    to_view: NDArray[np.float64]
-    candidates: Candidates
-    weights: FloatImage
-    shown: ShownRays
-    parallax: float
+        return AmbiguousRays(self.offset, *(part[rays] for part in self[1:]))
 
 
 def find_ambiguous_rays(
@@ -106,44 +82,33 @@ def find_ambiguous_rays(
     candidates: Candidates,
     weights: FloatImage,
     shown: ShownRays,
-    rows: tuple[int, int],
-    decided: NDArray[np.bool_] | None = None,
+    asked: NDArray[np.bool_],
     every: bool = False,
 ) -> AmbiguousRays:
-    """Return the ambiguous rays in rows [first, last) of these candidates, which should reach SEARCH_PX rows beyond.
+    """Return the ambiguous rays among those of candidates that are asked about (N, W); SEARCH_PX more surround them.
 
-    shown: heaviest candidates, see `look_up`. decided (N, W): rays that are not asked about. every:
-    take all rays near which anything lands, for training.
+    shown: heaviest candidates, see `look_up`. every: take all rays near which anything lands, for training.
     """
-    offset, (height, width) = candidates.offset, candidates.number.shape
-    landed = _Landed(rays.arrays, rays.to_view(offset), candidates, weights, shown, max(*map(abs, offset), 1e-9))
-    if decided is None:
-        decided = np.zeros((height, width), np.bool_)
-    pixel = np.empty(((rows[1] - rows[0]) * width, 2), np.int64)
-    pixel = pixel[: _select_rays(landed, decided, rows, every, pixel)]
+    arrays, to_view = rays.arrays, rays.to_view(candidates.offset)
+    parallax = max(*map(abs, candidates.offset), 1e-9)
+    if not every:
+        asked = asked.copy()
+        _keep_open_rays(candidates, weights, rays.photo_images, asked)
+    pixel = np.argwhere(asked)
     shape = len(pixel), HYPOTHESES
-    disparity, share, nearest = (np.zeros(shape, np.float32) for _ in range(3))
-    number, uncovered = np.zeros(len(pixel), np.uint8), np.empty(len(pixel), np.float32)
-    features = np.zeros((*shape, FEATURES), np.float32)
     found = AmbiguousRays(
-        offset, pixel, number, uncovered, disparity, np.zeros(shape, np.uint8), share, nearest, features
+        candidates.offset,
+        pixel,
+        np.zeros(len(pixel), np.uint8),
+        np.zeros(shape, np.float32),
+        np.zeros(shape, np.uint8),
+        np.zeros((*shape, FEATURES), np.float32),
     )
-    _lay_out(landed, every, found)
-    is_open = number > 0
-    found = found.chosen(is_open)
+    _lay_out(arrays, to_view, parallax, candidates, weights, shown, every, found)
+    found = found.chosen(found.number > 0)
     found.pixel[:, 0] += candidates.first_row
-    _describe(landed.rays, landed.to_view, landed.parallax, found)
+    _describe(arrays, to_view, parallax, found)
     return found
-
-
-def hypothesis_colors(rays: RaySet, ambiguous: AmbiguousRays) -> FloatImage:
-    """Return the colour (N, K, 3) that each hypothesis would show, sRGB-encoded; black in unused slots."""
-    mask, colors = ambiguous.mask, np.zeros((*ambiguous.disparity.shape, 3), np.float32)
-    for k in range(mask.shape[1]):
-        weights = np.zeros(mask.shape, np.float32)
-        weights[:, k] = mask[:, k]
-        colors[:, k] = np.where(mask[:, k, None], blend(rays, ambiguous, weights)[0], 0.0)
-    return colors
 
 
 def blend(
@@ -160,66 +125,57 @@ def blend(
 
 
 @kernel
-def _is_open(number, source, weights, photo_images, y, x):
-    """Return whether the closed form leaves open what a ray shows: it covers the ray in part, or by several surfaces of
-    which none is a fringe, which states the shares; and the heaviest leaves enough of the ray.
+def _keep_open_rays(candidates, weights, photo_images, asked):
+    """Clear asked (N, W) where the closed form leaves nothing open, as in smooth cells.
+
+    A ray is open if the closed form covers it in part, or by several surfaces of which none is a fringe, which states
+    the shares; and if the heaviest surface leaves enough of the ray.
     """
-    heaviest, covered, fringed = 0.0, 0.0, False
-    for k in range(np.int64(number[y, x])):
-        covered += weights[k, y, x]
-        heaviest = max(heaviest, weights[k, y, x])
-        fringed |= weights[k, y, x] > FAINT_WEIGHT and 0 < source[k, y, x] < photo_images
-    return 1.0 - heaviest > MIN_COLOR_CHANGE and (covered < 1.0 - FAINT_WEIGHT or not fringed)
-
-
-@kernel
-def _select_rays(landed, decided, selected_rows, every, pixel):
-    """Write the (row, column) of the ambiguous rays and return their number. Smooth cells have none."""
-    candidates, weights, photo_images = landed.candidates, landed.weights, landed.rays.photo_images
-    number, smooth, first_row = candidates.number, candidates.smooth, candidates.first_row
-    width = number.shape[1]
-    found = 0
-    for y in range(*selected_rows):
+    number, source, smooth = candidates.number, candidates.source, candidates.smooth
+    rows, width = number.shape
+    for y in range(rows):
         # Band rows count from first_row, cells from the picture's first row.
-        cell_row = (y + first_row % CELL_PX) // CELL_PX
-        for cell in range(smooth.shape[1]):
-            if smooth[cell_row, cell] and not every:
+        cell_row = (y + candidates.first_row % CELL_PX) // CELL_PX
+        for x in range(width):
+            if not asked[y, x] or smooth[cell_row, x // CELL_PX]:
+                asked[y, x] = False
                 continue
-            for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
-                is_open = every or _is_open(number, candidates.source, weights, photo_images, y, x)
-                if is_open and not decided[y, x]:
-                    pixel[found, 0], pixel[found, 1] = y, x
-                    found += 1
-    return found
+            heaviest, covered, fringed = 0.0, 0.0, False
+            for k in range(np.int64(number[y, x])):
+                covered += weights[k, y, x]
+                heaviest = max(heaviest, weights[k, y, x])
+                fringed |= weights[k, y, x] > FAINT_WEIGHT and 0 < source[k, y, x] < photo_images
+            is_open = covered < 1.0 - FAINT_WEIGHT or not fringed
+            asked[y, x] = is_open and 1.0 - heaviest > MIN_COLOR_CHANGE
 
 
 @kernel
-def _surfaces_around(landed, y, x, near_disparity, near_source, near_px):
-    """Write what shows around a ray, the nearest first, and return the number of surfaces."""
-    number, first_row, offsets = landed.candidates.number, landed.candidates.first_row, landed.to_view
-    (rows, width), height = number.shape, landed.rays.disparity.shape[1]
+def _surfaces_around(rays, offsets, candidates, shown, y, x, around):
+    """Write what shows around a ray, the nearest first: disparity, source and distance in pixels. Return how many."""
+    (near_disparity, near_source, near_px), number, first_row = around, candidates.number, candidates.first_row
+    (band_rows, width), height = number.shape, rays.disparity.shape[1]
     n = 0
     for i in range(len(AROUND)):
         v, u = y + AROUND[i, 0], x + AROUND[i, 1]
-        if not (0 <= v < rows and 0 <= u < width and number[v, u] > 0):
+        if not (0 <= v < band_rows and 0 <= u < width and number[v, u] > 0):
             continue
-        d, image = landed.shown.disparity[v, u], np.int64(landed.shown.source[v, u])
+        d, image = shown.disparity[v, u], np.int64(shown.source[v, u])
         source_x, source_y = x + d * offsets[image, 1], first_row + y + d * offsets[image, 0]
         is_inside = -0.5 <= source_x <= width - 0.5 and -0.5 <= source_y <= height - 0.5
-        if is_inside or image >= landed.rays.photo_images:  # the photo shows nothing beyond its frame
+        if is_inside or image >= rays.photo_images:  # the photo shows nothing beyond its frame
             near_disparity[n], near_source[n], near_px[n] = d, image, AROUND_DISTANCE[i]
             n += 1
     return n
 
 
 @kernel
-def _pick_apart(near_disparity, near_source, n, parallax, disparity, source, share, picked):
+def _pick_apart(near_disparity, near_source, n, parallax, disparity, source, picked):
     """Add the disparities around a ray by farthest-point sampling, until slots or distinct disparities run out, and
     return the number of hypotheses. One slot stays free. In a hole, begin with the front-most surface around it.
     """
     if picked == 0 and n > 0:
         foreground = np.argmax(near_disparity[:n])
-        disparity[0], source[0], share[0] = near_disparity[foreground], near_source[foreground], 0.0
+        disparity[0], source[0] = near_disparity[foreground], near_source[foreground]
         picked = 1
     # Differences between near and picked disparities.
     away = np.full(len(AROUND), np.inf)
@@ -236,22 +192,23 @@ def _pick_apart(near_disparity, near_source, n, parallax, disparity, source, sha
         if best < 0:
             break
         compared = picked
-        disparity[picked], source[picked], share[picked] = near_disparity[best], near_source[best], 0.0
+        disparity[picked], source[picked] = near_disparity[best], near_source[best]
         picked += 1
     return picked
 
 
 @kernel
-def _lay_out(landed, every, found):
+def _lay_out(rays, to_view, parallax, candidates, weights, shown, every, found):
     """Write the hypotheses of each ray: the surfaces on it, those around it, the plain look-up.
 
     The number stays 0 where nothing is to be decided.
     """
-    candidates, weights, parallax = landed.candidates, landed.weights, landed.parallax
-    near_d, near_k, near_px = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
+    around = np.empty(len(AROUND)), np.empty(len(AROUND), np.int64), np.empty(len(AROUND))
+    near_d, near_k, near_px = around
     for ray in range(len(found.pixel)):
         y, x = found.pixel[ray, 0], found.pixel[ray, 1]
-        disparity, source, share = found.disparity[ray], found.source[ray], found.share[ray]
+        disparity, source, features = found.disparity[ray], found.source[ray], found.features[ray]
+        share = features[:, SHARE]
         # First the surfaces on the ray itself. One slot stays free for the plain hypothesis.
         picked, mixed, left = 0, 0, 1.0
         for k in range(np.int64(candidates.number[y, x])):
@@ -261,41 +218,43 @@ def _lay_out(landed, every, found):
                 share[picked] = weights[k, y, x]
                 mixed = picked if disparity[picked] > disparity[mixed] else mixed
                 picked += 1
-        found.uncovered[ray] = max(left, 0.0)
-        n = _surfaces_around(landed, y, x, near_d, near_k, near_px)
-        picked = _pick_apart(near_d, near_k, n, parallax, disparity, source, share, picked)
-        if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source, share)):
+        n = _surfaces_around(rays, to_view, candidates, shown, y, x, around)
+        picked = _pick_apart(near_d, near_k, n, parallax, disparity, source, picked)
+        first_row, own = candidates.first_row, disparity[:picked]
+        if picked == 0 or not (
+            every or _is_undecided(rays.colors, to_view, parallax, first_row + y, x, own, source, share)
+        ):
             continue
         # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
-        disparity[picked], source[picked], share[picked] = disparity[mixed], source[mixed], 0.0
+        disparity[picked], source[picked] = disparity[mixed], source[mixed]
         found.number[ray] = picked + 1
+        features[: picked + 1, UNCOVERED] = max(left, 0.0)
         # Distance at which each surface lands: 0 on the ray itself, else that of the first landing of it.
         for j in range(picked + 1):
-            found.nearest[ray, j] = 0.0 if share[j] > 0 else NOWHERE_PX
             if share[j] > 0:
                 continue
+            features[j, LANDS] = 1.0
             for i in range(n):
                 if abs(near_d[i] - disparity[j]) * parallax < SAME_SURFACE_PX:
-                    found.nearest[ray, j] = near_px[i]
+                    features[j, LANDS] = near_px[i] / NOWHERE_PX
                     break
 
 
 @kernel
-def _is_undecided(landed, y, x, disparity, source, share):
+def _is_undecided(images, offsets, parallax, y, x, disparity, source, share):
     """Return whether a ray's hypotheses are several surfaces whose colours differ visibly, see MIN_COLOR_CHANGE.
 
     Their colours are those of the four pixels around where each of them looks its colour up.
     """
-    images, offsets = landed.rays.colors, landed.to_view
     _, height, width, _ = images.shape
     apart = 0.0
     low_r = low_g = low_b = np.float32(np.inf)
     high_r = high_g = high_b = np.float32(-np.inf)
     for j in range(len(disparity)):
         d, k = disparity[j], np.uint64(source[j])
-        apart = max(apart, abs(d - disparity[0]) * landed.parallax)
+        apart = max(apart, abs(d - disparity[0]) * parallax)
         column = floor(x + d * offsets[k, 1])
-        row = floor(landed.candidates.first_row + y + d * offsets[k, 0])
+        row = floor(y + d * offsets[k, 0])
         for i in range(4):
             u = np.uint64(min(max(column + i % 2, 0), width - 1))
             v = np.uint64(min(max(row + i // 2, 0), height - 1))
@@ -335,7 +294,7 @@ def _source_disparity(surfaces, k, x, y, d):
 
 @kernel
 def _describe(rays, offsets, parallax, found):
-    """Write the features of each hypothesis."""
+    """Write the features of each hypothesis that the layout did not."""
     surfaces = rays.disparity
     _, height, width = surfaces.shape
     # Unit vectors along each source's parallax.
@@ -364,12 +323,9 @@ def _describe(rays, offsets, parallax, found):
             out[AGREES] = _softsign((d - _source_disparity(surfaces, k, source_x, source_y, d)) * parallax)
             out[TO_NEAREST] = _softsign((foreground - d) * parallax)
             out[TO_FARTHEST] = _softsign((d - background) * parallax)
-            out[SHARE] = found.share[n, a]
-            out[LANDS] = found.nearest[n, a] / NOWHERE_PX
             out[INPAINTED] = 1.0 if k >= rays.photo_images else 0.0
             out[PARALLAX] = log_parallax
             out[COVERAGE] = rays.coverage[k, v, u]
-            out[UNCOVERED] = found.uncovered[n]
             out[PLAIN] = 1.0 if a == number - 1 else 0.0
 
 

@@ -75,10 +75,11 @@ def find_candidates(
         np.empty(shape, np.uint8),
         smooth,
     )
-    arrays, cells = rays.arrays, rays.cells
+    arrays, no_steep = rays.arrays, np.zeros_like(rays.steep)
     for k, (t, s) in enumerate(rays.to_view(offset)):
-        needed = np.flatnonzero(land_rough(cells, k, t, s, rows, splat))
-        _land_rays(arrays, k, (rays.joined, rays.steep_cells(k)), needed, columns, (t, s), found)
+        needed = np.flatnonzero(land_rough(arrays, k, t, s, rows, splat))
+        # Only the photo has steep surfaces.
+        _land_rays(arrays, k, (rays.joined, no_steep if k else rays.steep), needed, columns, (t, s), found)
     _mean_disparity(found, splat)
     backward_warp(arrays.disparity[0], offset, about, found)
     return found

@@ -60,11 +60,6 @@ def look_up(
     return shown
 
 
-def heaviest_candidates(rays: RaySet, candidates: Candidates, weights: FloatImage) -> ShownRays:
-    """Return what `look_up` returns with all colours black."""
-    return look_up(rays, candidates, weights, np.zeros(candidates.number.shape, np.bool_))
-
-
 @kernel
 def keys_weights(f, a):
     """Return Keys' weights of the pixels at -1, 0, 1, 2 for a position f in [0, 1); single precision if f and a are."""

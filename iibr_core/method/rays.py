@@ -40,8 +40,9 @@ class RayArrays(NamedTuple):
 
     offsets (S, 2): viewpoint (t, s) of each image. colors (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN without
     a surface. coverage (S, H, W): share of the pixel that the ray fills, 0 = no ray. near_edge (S, H, W): whether a
-    look-up of 4x4 pixels may meet two surfaces. photo_images: number of images, from the first on, that hold what the
-    photo shows; the others are inpainted.
+    look-up of 4x4 pixels may meet two surfaces. low, high (S, M, N): least and greatest disparity of cells of CELL_PX x
+    CELL_PX pixels, (inf, -inf) without rays; row_ranges (S, M, 2): the same of whole rows of cells. photo_images:
+    number of images, from the first on, that hold what the photo shows; the others are inpainted.
     """
 
     offsets: NDArray[np.float64]
@@ -49,21 +50,10 @@ class RayArrays(NamedTuple):
     disparity: FloatImage
     coverage: FloatImage
     near_edge: NDArray[np.bool_]
-    photo_images: int
-
-
-class Cells(NamedTuple):
-    """The rays of S images, summarised by cells of CELL_PX x CELL_PX pixels.
-
-    low, high (S, M, N): least and greatest disparity, (inf, -inf) without rays. row_ranges (S, M, 2): the same of whole
-    rows of cells. step (M, N): largest step between the photo's pixels and their neighbours, inf if one is unknown and
-    at the border.
-    """
-
     low: FloatImage
     high: FloatImage
     row_ranges: FloatImage
-    step: FloatImage
+    photo_images: int
 
 
 class RaysBehind(NamedTuple):
@@ -81,9 +71,10 @@ class RaySet:
     """Images of rays of one size (height, width), at most `capacity` of them.
 
     farthest_views: largest view offset that will be rendered; steps of disparity are judged there. margins: of the
-    images around every view. joined (H, W): rays of the photo on steep surfaces, see `join_steep_rays`. stages: that
-    are on. photo_disparity: the photo's, at the size of views. photo_detail: see
-    `measure_detail`. photo_images: see `RayArrays`.
+    images around every view. stages: that are on. photo_images: see `RayArrays`. Of the photo: photo_disparity, at the
+    size of views; photo_detail, see `measure_detail`; joined (H, W), rays on steep surfaces, see `join_steep_rays`;
+    steep (M, N), cells with such rays; cell_steps (M, N), largest step between the pixels of a cell and their
+    neighbours, inf if one is unknown and at the border.
     """
 
     def __init__(
@@ -97,20 +88,14 @@ class RaySet:
         """size: of the images, margins included."""
         self.farthest_views, self.margins, self.stages = farthest_views, margins, stages
         self.photo_images, self._count = 0, 0
-        self.photo_disparity = self.photo_detail = np.empty((0, 0), np.float32)
-        self._room = RayArrays(
-            np.empty((capacity, 2)),
-            np.empty((capacity, *size, 3), np.float32),
-            np.empty((capacity, *size), np.float32),
-            np.empty((capacity, *size), np.float32),
-            np.empty((capacity, *size), np.bool_),
-            0,
-        )
+        self.photo_disparity = self.photo_detail = self.cell_steps = np.empty((0, 0), np.float32)
         cells = -(-size.height // CELL_PX), -(-size.width // CELL_PX)
-        low, high = (np.empty((capacity, *cells), np.float32) for _ in range(2))
-        row_ranges = np.empty((capacity, cells[0], 2), np.float32)
-        self._cells_room = Cells(low, high, row_ranges, np.empty(cells, np.float32))
-        self.joined, self._steep = np.zeros(size, np.uint8), np.zeros(cells, np.bool_)
+        floats = (*size, 3), size, size, size, cells, cells, (cells[0], 2)
+        colors, disparity, coverage, near_edge, *of_cells = (
+            np.empty((capacity, *shape), np.float32 if k != 3 else np.bool_) for k, shape in enumerate(floats)
+        )
+        self._room = RayArrays(np.empty((capacity, 2)), colors, disparity, coverage, near_edge, *of_cells, 0)
+        self.joined, self.steep = np.zeros(size, np.uint8), np.zeros(cells, np.bool_)
 
     def add(
         self,
@@ -125,26 +110,26 @@ class RaySet:
         behind: of a view, what counts instead at some pixels. Rays in front of what the photo shows are left out: the
         photo would show them.
         """
-        k, cells = self._count, self._cells_room
+        k, room, one_surface = self._count, self._room, step_of(SAME_SURFACE_PX, self.farthest_views)
         self._write(k, colors, disparity, coverage, behind)
-        disparity, coverage = self._room.disparity[k], self._room.coverage[k]
+        disparity, coverage = room.disparity[k], room.coverage[k]
         if k == 0:
             self.photo_disparity = np.ascontiguousarray(self.in_view(disparity))
-            self._join_steep_rays(disparity)
-            raise_if_stopped()
-            cells.step[:] = _block_reduce(np.maximum, _neighbour_steps(disparity))
-        if k > 0 and any(offset) and self.stages.leave_out_in_front:
+            self.cell_steps = _block_reduce(np.maximum, _neighbour_steps(disparity))
+            if self.stages.connect_slopes:
+                self.joined = join_steep_rays(disparity, one_surface)
+                self.steep = _block_reduce(np.logical_or, is_joined(self.joined))
+        elif any(offset) and self.stages.leave_out_in_front:
             edge_step = step_of(EDGE_PX, self.farthest_views)
-            _leave_out_in_front(disparity, self._room.disparity[0], *offset, edge_step, coverage)
+            _leave_out_in_front(disparity, room.disparity[0], *offset, edge_step, coverage)
         raise_if_stopped()
-        joined = self.joined if k == 0 else None
-        self._room.near_edge[k] = near_steps(disparity, step_of(SAME_SURFACE_PX, self.farthest_views), joined)
+        room.near_edge[k] = near_steps(disparity, one_surface, self.joined if k == 0 else None)
         raise_if_stopped()
         known = (coverage > 0) & (disparity == disparity)
-        cells.low[k] = _block_reduce(np.minimum, np.where(known, disparity, np.float32(np.inf)))
-        cells.high[k] = _block_reduce(np.maximum, np.where(known, disparity, np.float32(-np.inf)))
-        cells.row_ranges[k, :, 0], cells.row_ranges[k, :, 1] = cells.low[k].min(axis=1), cells.high[k].max(axis=1)
-        self._room.offsets[k] = offset
+        room.low[k] = _block_reduce(np.minimum, np.where(known, disparity, np.float32(np.inf)))
+        room.high[k] = _block_reduce(np.maximum, np.where(known, disparity, np.float32(-np.inf)))
+        room.row_ranges[k, :, 0], room.row_ranges[k, :, 1] = room.low[k].min(axis=1), room.high[k].max(axis=1)
+        room.offsets[k] = offset
         self._count += 1
         self.photo_images += not any(offset)
 
@@ -169,39 +154,17 @@ class RaySet:
     @property
     def arrays(self) -> RayArrays:
         """The rays added so far."""
-        added, room = slice(self._count), self._room
-        return RayArrays(
-            room.offsets[added],
-            room.colors[added],
-            room.disparity[added],
-            room.coverage[added],
-            room.near_edge[added],
-            self.photo_images,
-        )
-
-    @property
-    def cells(self) -> Cells:
-        """The rays added so far, summarised."""
-        added, room = slice(self._count), self._cells_room
-        return Cells(room.low[added], room.high[added], room.row_ranges[added], room.step)
+        *room, _ = self._room
+        return RayArrays(*(part[: self._count] for part in room), self.photo_images)
 
     def to_view(self, offset: ViewOffset) -> NDArray[np.float64]:
         """Return the steps (S, 2) from each image to the view at `offset`."""
         return np.array(offset) - self._room.offsets[: self._count]
 
-    def steep_cells(self, k: int) -> NDArray[np.bool_]:
-        """Return the cells (M, N) of image k with steep surfaces. Only the photo has any."""
-        return self._steep if k == 0 else np.zeros_like(self._steep)
-
     def smooth_step(self, offset: ViewOffset) -> float:
         """Return the largest step of the photo that belongs to a smooth surface in the view at `offset`."""
         nearness = self.farthest_views / max(*map(abs, offset), 1e-9)
         return SMOOTH_SHARE * step_of(SAME_SURFACE_PX, self.farthest_views) * max(nearness, 1.0)
-
-    def _join_steep_rays(self, disparity: FloatImage) -> None:
-        if self.stages.connect_slopes:
-            self.joined = join_steep_rays(disparity, step_of(SAME_SURFACE_PX, self.farthest_views))
-            self._steep = _block_reduce(np.logical_or, is_joined(self.joined))
 
     def _write(
         self,
@@ -214,8 +177,7 @@ class RaySet:
         """Write image k; an image of the size of a view gets margins without rays."""
         rooms = self._room.colors[k], self._room.disparity[k], self._room.coverage[k]
         for room, given, nothing in zip(rooms, (colors, disparity, coverage), (0.0, np.nan, 0.0)):
-            if image_size(given) != self.size:
-                room[:] = nothing
+            room[:] = nothing
             shown = room if image_size(given) == self.size else self.in_view(room)
             shown[:] = given
         if behind is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.method.rays import CELL_PX, Cells, RaySet
+from iibr_core.method.rays import CELL_PX, RayArrays, RaySet
 from iibr_core.runtime.kernels import kernel
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset
@@ -33,13 +33,13 @@ def find_smooth_cells(
     The first row of cells holds the target row rows[0], the last the row before rows[1]. Cells without any of columns
     [first, last), by default all, are not looked at, and not smooth.
     """
-    cells, first = rays.cells, rows[0] // CELL_PX
-    shape = -(-rows[1] // CELL_PX) - first, cells.low.shape[2]
+    arrays, first = rays.arrays, rows[0] // CELL_PX
+    shape = -(-rows[1] // CELL_PX) - first, arrays.low.shape[2]
     far, near = np.full(shape, np.inf, np.float32), np.full(shape, -np.inf, np.float32)
     smooth = cells_in(columns or (0, rays.size.width), shape)
     parallax = max(*map(abs, offset), 1e-9)
-    rough = ~(cells.step <= rays.smooth_step(offset))
-    _land_cells(cells, rough, rays.to_view(offset), first, rays.photo_images, parallax, (far, near), smooth)
+    rough = ~(rays.cell_steps <= rays.smooth_step(offset))
+    _land_cells(arrays, rough, rays.to_view(offset), first, parallax, (far, near), smooth)
     # Something lands, and its parts stay together.
     smooth &= (near >= far) & ((near - far) * parallax <= EDGE_PX)
     return smooth, np.where(smooth, far, np.float32(0.0))
@@ -53,75 +53,74 @@ def cells_in(columns: tuple[int, int], shape: tuple[int, int]) -> NDArray[np.boo
 
 
 def land_rough(
-    cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], splat: NDArray[np.bool_]
+    rays: RayArrays, k: int, t: float, s: float, rows: tuple[int, int], splat: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Return which cells (M, N) of source k, t and s away, may land on a cell of these rows that is to be splatted."""
-    needed = np.zeros(cells.step.shape, np.bool_)
-    _land_rough(cells, k, t, s, rows[0] // CELL_PX, splat, needed)
+    needed = np.zeros(rays.low.shape[1:], np.bool_)
+    _land_rough(rays, k, t, s, rows[0] // CELL_PX, splat, needed)
     return needed
 
 
 @kernel
-def _target_cells(first, least, most):
-    """Return the first and last cell (fractions) that the pixels of cell `first` touch, moved by -least to -most."""
+def _landing(first, least, most, count):
+    """Return the first of `count` target cells that the pixels of cell `first`, moved by -least to -most, touch, and
+    the one after the last.
+    """
     # Cells are counted from the border of the picture, half a pixel before the first pixel centre.
     shrunk = 0.5 - LANDING_REACH_PX
-    return first + (shrunk - max(least, most)) / CELL_PX, first + 1 - (shrunk + min(least, most)) / CELL_PX
+    before, after = first + (shrunk - max(least, most)) / CELL_PX, first + 1 - (shrunk + min(least, most)) / CELL_PX
+    if not (after >= 0 and before < count):
+        return 0, 0
+    return int(max(before, 0.0)), int(min(after, count - 1.0)) + 1
 
 
 @kernel
-def _touches(least, most, t, row, rows):
-    """Return whether a row of cells with these disparities can land on cells [0, rows)."""
-    top, bottom = _target_cells(row, np.float64(least) * t, np.float64(most) * t)
-    return least <= most and bottom >= 0 and top < rows
-
-
-@kernel
-def _land_cells(cells, rough, offsets, first_cell, photo_images, parallax, ranges, smooth):
+def _land_cells(rays, rough, offsets, first_cell, parallax, ranges, smooth):
     """Let the cells of all sources land, the photo's first. ranges: least and greatest disparity that land smoothly."""
-    far, near = ranges
-    low, high, row_ranges = cells.low, cells.high, cells.row_ranges
-    rows, columns = smooth.shape
+    (far, near), (rows, columns) = ranges, smooth.shape
     # The photo comes first: inpainted rays are compared with what it shows.
     for k in range(len(offsets)):
         t, s = offsets[k]
-        for v in range(low.shape[1]):
-            # Whole rows of cells that land elsewhere are passed over at once.
-            if not _touches(row_ranges[k, v, 0], row_ranges[k, v, 1], t, v - first_cell, rows):
+        for v in range(rays.low.shape[1]):
+            # Whole rows of cells that land elsewhere are passed over at once; without rays, their range is not finite.
+            least, most = np.float64(rays.row_ranges[k, v, 0]), np.float64(rays.row_ranges[k, v, 1])
+            top, bottom = _landing(v - first_cell, least * t, most * t, rows)
+            if not (least <= most and top < bottom):
                 continue
-            for u in range(low.shape[2]):
-                # All target cells that rays of this cell may touch.
-                least, most = np.float64(low[k, v, u]), np.float64(high[k, v, u])
-                top, bottom = _target_cells(v - first_cell, least * t, most * t)
-                left, right = _target_cells(u, least * s, most * s)
-                if not (least <= most and bottom >= 0 and top < rows and right >= 0 and left < columns):
+            for u in range(rays.low.shape[2]):
+                least, most = np.float64(rays.low[k, v, u]), np.float64(rays.high[k, v, u])
+                if not least <= most:
                     continue
-                for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
-                    for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
+                # All target cells that rays of this cell may touch.
+                top, bottom = _landing(v - first_cell, least * t, most * t, rows)
+                left, right = _landing(u, least * s, most * s, columns)
+                for row in range(top, bottom):
+                    for column in range(left, right):
                         # Smooth cells widen the range of landing disparities; all other cells need splatting.
                         if k == 0 and not rough[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
-                        elif k < photo_images or (most - far[row, column]) * parallax > SAME_SURFACE_PX:
+                        elif k < rays.photo_images or (most - far[row, column]) * parallax > SAME_SURFACE_PX:
                             smooth[row, column] = False
 
 
 @kernel
-def _land_rough(cells, k, t, s, first_cell, splat, needed):
-    low, high, row_ranges = cells.low[k], cells.high[k], cells.row_ranges[k]
-    rows, columns = splat.shape
-    for v in range(low.shape[0]):
-        if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
+def _land_rough(rays, k, t, s, first_cell, splat, needed):
+    low, high, (rows, columns) = rays.low[k], rays.high[k], splat.shape
+    for v in range(len(low)):
+        least, most = np.float64(rays.row_ranges[k, v, 0]), np.float64(rays.row_ranges[k, v, 1])
+        top, bottom = _landing(v - first_cell, least * t, most * t, rows)
+        if not (least <= most and top < bottom):
             continue
         for u in range(low.shape[1]):
             least, most = np.float64(low[v, u]), np.float64(high[v, u])
-            top, bottom = _target_cells(v - first_cell, least * t, most * t)
-            left, right = _target_cells(u, least * s, most * s)
-            if not (least <= most and bottom >= 0 and top < rows and right >= 0 and left < columns):
+            if not least <= most:
                 continue
-            for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
-                for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
-                    # One target cell that needs splatting is enough.
+            top, bottom = _landing(v - first_cell, least * t, most * t, rows)
+            left, right = _landing(u, least * s, most * s, columns)
+            # One target cell that needs splatting is enough.
+            for row in range(top, bottom):
+                for column in range(left, right):
                     needed[v, u] |= splat[row, column]
 
 

@@ -116,8 +116,8 @@ class Renderer:
         if not self.transformer:
             return None
         # Rays that are covered in part are composited over their background, not decided.
-        settled = ~wanted | (share < max(_min_coverage(rays), MIN_COVERED))
-        ambiguous = find_ambiguous_rays(rays, candidates, weights, found, (above, above + last - first), settled)
+        asked = wanted & (share >= max(_min_coverage(rays), MIN_COVERED))
+        ambiguous = find_ambiguous_rays(rays, candidates, weights, found, asked)
         raise_if_stopped()
         colors, disparity, source = blend(rays, ambiguous, self.transformer(ambiguous))
         y, x = ambiguous.pixel[:, 0] - rays.margins.top, ambiguous.pixel[:, 1] - left

@@ -111,8 +111,8 @@ class KernelLocator:
         return sources_hash(self._file)
 
     def get_disambiguator(self) -> str:
-        """Return an addition to the file's name: none, because no two kernels of a file share a name."""
-        return ""
+        """Return an addition to the file's name: kernels of other sources may name records that no longer exist."""
+        return sources_hash(self._file)[:16]
 
 
 @cache

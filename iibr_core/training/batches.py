@@ -14,10 +14,10 @@ from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.edges.refine import refine
-from iibr_core.method.ambiguous_rays import SEARCH_PX, SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
+from iibr_core.method.ambiguous_rays import SEARCH_PX, SHARE, AmbiguousRays, blend, find_ambiguous_rays
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form
-from iibr_core.method.look_up import heaviest_candidates
+from iibr_core.method.look_up import look_up
 from iibr_core.method.rays import RaySet, rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
@@ -87,7 +87,7 @@ def _random_offset(radius: int, rng: np.random.Generator) -> ViewOffset:
 
 def _view_rays(scene: RaycastScene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator) -> LabelledRays:
     """Return a random choice of the ambiguous rays of a view."""
-    ambiguous = ambiguous_rays_of_view(rays, offset, (0, SIZE.height), False)
+    ambiguous = _ambiguous_rays(rays, offset, (0, SIZE.height), False)
     return _label(scene, rays, ambiguous, rng.permutation(len(ambiguous.pixel))[:RAYS_PER_VIEW])
 
 
@@ -97,20 +97,21 @@ def _epi_rays(scene: RaycastScene, rays: RaySet, radius: int, rng: np.random.Gen
     first = int(rng.integers(0, SIZE.width - EPI_WIDTH + 1))
     views = []
     for s in np.linspace(-radius, radius, EPI_VIEWS):
-        ambiguous = ambiguous_rays_of_view(rays, ViewOffset(0.0, float(s)), (row, row + 1), True)
+        ambiguous = _ambiguous_rays(rays, ViewOffset(0.0, float(s)), (row, row + 1), True)
         column = ambiguous.pixel[:, 1]
         chosen = np.flatnonzero((first <= column) & (column < first + EPI_WIDTH))
         views.append(_label(scene, rays, ambiguous, chosen))
     return views if all(len(view.truth) == EPI_WIDTH for view in views) else []
 
 
-def ambiguous_rays_of_view(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool) -> AmbiguousRays:
+def _ambiguous_rays(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool) -> AmbiguousRays:
     """Return the ambiguous rays, or every ray, in rows [first, last) of the view at an offset."""
     above = min(rows[0], SEARCH_PX)
     candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + SEARCH_PX, rays.size.height)))
-    weights, _ = closed_form(candidates)
-    shown = heaviest_candidates(rays, candidates, weights)
-    return find_ambiguous_rays(rays, candidates, weights, shown, (above, above + rows[1] - rows[0]), every=every)
+    weights, share = closed_form(candidates)
+    asked = np.zeros(share.shape, np.bool_)
+    asked[above : above + rows[1] - rows[0]] = True
+    return find_ambiguous_rays(rays, candidates, weights, look_up(rays, candidates, weights), asked, every)
 
 
 def _label(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, chosen: NDArray[np.intp]) -> LabelledRays:
@@ -118,8 +119,14 @@ def _label(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, chosen: 
     ambiguous = ambiguous.chosen(chosen)
     y, x = ambiguous.pixel.T
     truth, _ = cast(scene, x, y, ambiguous.offset)
-    colors = hypothesis_colors(rays, ambiguous)
+    colors = _hypothesis_colors(rays, ambiguous)
     return LabelledRays(ambiguous.features, ambiguous.mask, linear_from_srgb(colors), linear_from_srgb(truth))
+
+
+def _hypothesis_colors(rays: RaySet, ambiguous: AmbiguousRays) -> FloatImage:
+    """Return the colour (N, K, 3) that each hypothesis would show, sRGB-encoded; black in unused slots."""
+    mask, slots = ambiguous.mask, np.eye(ambiguous.disparity.shape[1], dtype=np.float32)
+    return np.stack([blend(rays, ambiguous, slot * mask)[0] for slot in slots], axis=1)
 
 
 def _color_gain(features: Tensor, mask: Tensor, colors: Tensor, truth: Tensor) -> float:
