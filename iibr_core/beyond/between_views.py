@@ -8,9 +8,9 @@ is covered. Pixels that none of them shows are inpainted once and join the rays.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from math import hypot
 
@@ -32,6 +32,7 @@ from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
 from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
 
+CENTRE = ViewOffset(0.0, 0.0)
 VIEW_BYTES = 60
 """Bytes of a pixel of each given view: its colours, its disparity, and two images of rays."""
 MAX_COMPLETING = 10
@@ -42,20 +43,7 @@ COVERED_POWER = 2
 """Exponent of the covered share of a ray in the weight of a given view."""
 
 
-@dataclass(frozen=True, eq=False)
-class GivenView:
-    """A view of a sparse grid, at row and column.
-
-    colors (H, W, 3): see StoredColors. disparity (H, W): in px per step of the sparse grid.
-    """
-
-    row: int
-    column: int
-    colors: StoredColors
-    disparity: FloatImage
-
-
-def read_given_views(scene: MultiView) -> list[GivenView]:
+def read_given_views(scene: MultiView) -> list[ViewUpdate]:
     """Return all views of a light field that fill a grid, with their disparity, estimated if the files have none.
 
     Raises InputError if a file cannot be read, no disparity can be found, or memory does not suffice.
@@ -76,9 +64,7 @@ def read_given_views(scene: MultiView) -> list[GivenView]:
         require_memory(sweep_bytes(size, range_px, float(max(grid) - 1)), f"{scene.name}: finding its disparity")
         maps = estimate_all([view.colors for view in settled.views], settled.offsets, range_px)
         read = [replace(view, disparity=values) for view, values in zip(settled.views, maps)]
-    return [
-        GivenView(view.row, view.column, view.colors, view.disparity) for view in read if view.disparity is not None
-    ]
+    return read
 
 
 def require_steps(sparse: GridShape, dense: GridShape, name: str = "the light field") -> int:
@@ -105,38 +91,42 @@ def _advice(sparse: GridShape, dense: GridShape) -> str:
 
 
 def densify(
-    given: Sequence[GivenView],
+    given: Sequence[ViewUpdate],
     sparse: GridShape,
     dense: GridShape,
     inpainter: Inpainter = fill_background,
-    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+    nearest_to: Callable[[], ViewOffset] = lambda: CENTRE,
     row_step: float = 1.0,
 ) -> Generator[ViewUpdate]:
     """Yield every view of the dense grid once: the centre, the given ones unchanged, then those nearest to
     `nearest_to()`.
 
-    given: all views of the sparse grid, of equal size. row_step: distance between rows, in distances between columns.
-    Disparity is per column of the dense grid. Raises InputError as `require_steps` does.
+    given: all views of the sparse grid, of equal size, with disparity in px per step of it; that of the dense grid is
+    per column of it. row_step: distance between rows, in distances between columns. Raises InputError as
+    `require_steps` does.
     """
     steps, is_hdr = require_steps(sparse, dense), given[0].colors.dtype != np.uint8
-    places = {(view.row * steps, view.column * steps): view for view in given}
-    remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
-    completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
-    remaining = [offset for offset in remaining if offset not in completing]
+    own = {
+        dense.offset(view.row * steps, view.column * steps): (view.colors, view.disparity / np.float32(steps))
+        for view in given
+        if view.disparity is not None
+    }
+    completing = [offset for offset in _completing_views(sparse, dense, steps) if offset not in own]
+    every = [dense.offset(*at) for at in np.ndindex(*dense)]
+    remaining = [offset for offset in every if offset not in own and offset not in completing]
     # The centre comes first, given or not.
-    early = 0 if dense.centre in places else 1
+    early = 0 if CENTRE in own else 1
 
     def stored(offset: ViewOffset, view: View) -> ViewUpdate:
-        (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, 1)
-        return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
+        colors = encode_for_storage(view.colors, is_hdr, 1)
+        return ViewUpdate(*dense.index_of(offset), colors, view.disparity, view.inpainted)
 
     with suppress(Cancelled):
-        views = _ViewsBetween(given, steps, dense, inpainter, row_step)
+        views = _ViewsBetween(own, steps, max(dense), inpainter, row_step)
         for offset in completing[:early]:
             yield stored(offset, views.complete(offset))
-        for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
-            inpainted = np.zeros(view.disparity.shape, np.bool_)
-            yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), inpainted)
+        for offset, (colors, disparity) in sorted(own.items(), key=lambda item: hypot(*item[0])):
+            yield ViewUpdate(*dense.index_of(offset), colors, disparity, np.zeros(disparity.shape, np.bool_))
         for offset in completing[early:]:
             yield stored(offset, views.complete(offset))
         yield from side_by_side(lambda offset: stored(offset, views.make(offset)), nearest_first(remaining, nearest_to))
@@ -146,20 +136,20 @@ class _ViewsBetween:
     """Makes views between given ones, in several threads once the rays are complete."""
 
     def __init__(
-        self, given: Sequence[GivenView], steps: int, dense: GridShape, inpainter: Inpainter, row_step: float
+        self,
+        given: Mapping[ViewOffset, tuple[StoredColors, FloatImage]],
+        steps: int,
+        longer_side: int,
+        inpainter: Inpainter,
+        row_step: float,
     ) -> None:
         self._renderer, self._steps, self._inpainter, self._row_step = Renderer(), steps, inpainter, row_step
         farthest = max(row_step, 1.0)
-        self._sources: list[tuple[ViewOffset, RaySet]] = [
-            (
-                dense.offset(view.row * steps, view.column * steps),
-                rays_of_photo(
-                    encoded_from_stored(view.colors), view.disparity / np.float32(steps), steps * farthest, 0
-                ),
-            )
-            for view in given
-        ]
-        self._farthest = max(dense) * farthest
+        self._sources = {
+            offset: rays_of_photo(encoded_from_stored(colors), disparity, steps * farthest, 0)
+            for offset, (colors, disparity) in given.items()
+        }
+        self._farthest = longer_side * farthest
         self._inpainted: tuple[ViewOffset, RaySet] | None = None
 
     def complete(self, offset: ViewOffset) -> View:
@@ -184,16 +174,16 @@ class _ViewsBetween:
             colors[is_filled], disparity[is_filled] = filled.colors[is_filled], filled.disparity[is_filled]
             hole &= filled.occluded
         if hole.any():
-            at, nearest = min(self._sources, key=lambda source: hypot(*self._moved(source[0], offset)))
-            self._inpainter(colors, disparity, hole, nearest.photo_disparity, self._moved(at, offset))
+            at, nearest = min(self._sources.items(), key=lambda source: hypot(*self._moved(source[0], offset)))
+            self._inpainter(colors, disparity, hole, nearest.photo_disparity, self._moved(at, offset), 1)
         return view
 
     def _merge(self, offset: ViewOffset) -> View:
         """Return the mean of the given views around, seen from an offset, with holes."""
-        size = self._sources[0][1].view_size
+        size = next(iter(self._sources.values())).view_size
         colors, disparity = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
         total, heaviest = np.zeros(size, np.float32), np.zeros(size, np.float32)
-        for at, rays in self._sources:
+        for at, rays in self._sources.items():
             away = ViewOffset(offset.t - at.t, offset.s - at.s)
             if max(map(abs, away)) > self._steps:
                 continue

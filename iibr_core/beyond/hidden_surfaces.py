@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.inpainting.background import fill_behind
+from iibr_core.inpainting.background import fill_background
 from iibr_core.method.mixed_pixels import split_mixed_pixels
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
@@ -76,39 +76,27 @@ def hidden_surface(
         _land(view_colors, view.disparity, mask, *map(float, view.offset), disparity, edge, (background, behind, known))
     open_hole = hole & ~known
     if open_hole.any():
-        fill_behind(background, behind, open_hole, disparity, edge, threads)
+        here = ViewOffset(0.0, 0.0)
+        fill_background(background, behind, open_hole, disparity, here, threads, farthest_views=lens_radius)
     return HiddenSurface(background, behind, ~hole | (behind < disparity - STRAY * edge))
 
 
 @kernel
 def _lowest_within_reach(disparity, slope, lowest):
-    """Write the least disparity (H, W) around each pixel, raised by `slope` for each pixel of distance (two passes)."""
-    height, width = disparity.shape
-    diagonal = slope * DIAGONAL
-    for y in range(height):
-        for x in range(width):
-            least = disparity[y, x]
-            if y > 0:
-                least = min(least, lowest[y - 1, x] + slope)
-                if x > 0:
-                    least = min(least, lowest[y - 1, x - 1] + diagonal)
-                if x < width - 1:
-                    least = min(least, lowest[y - 1, x + 1] + diagonal)
-            if x > 0:
-                least = min(least, lowest[y, x - 1] + slope)
-            lowest[y, x] = least
-    for y in range(height - 1, -1, -1):
-        for x in range(width - 1, -1, -1):
-            least = lowest[y, x]
-            if y < height - 1:
-                least = min(least, lowest[y + 1, x] + slope)
-                if x > 0:
-                    least = min(least, lowest[y + 1, x - 1] + diagonal)
-                if x < width - 1:
-                    least = min(least, lowest[y + 1, x + 1] + diagonal)
-            if x < width - 1:
-                least = min(least, lowest[y, x + 1] + slope)
-            lowest[y, x] = least
+    """Write the least disparity (H, W) around each pixel, raised by `slope` for each pixel of distance."""
+    (height, width), diagonal = disparity.shape, slope * DIAGONAL
+    lowest[:] = disparity
+    # Two passes, each from the pixels that it has visited: down and to the right, then back.
+    for way in (1, -1):
+        for j in range(height):
+            y = j if way > 0 else height - 1 - j
+            for i in range(width):
+                x = i if way > 0 else width - 1 - i
+                for v, u, rise in (
+                    (y - way, x - 1, diagonal), (y - way, x, slope), (y - way, x + 1, diagonal), (y, x - way, slope)
+                ):  # fmt: skip
+                    if 0 <= v < height and 0 <= u < width:
+                        lowest[y, x] = min(lowest[y, x], lowest[v, u] + rise)
 
 
 @kernel

@@ -38,79 +38,19 @@ def fill_background(
     offset: ViewOffset,
     threads: int = 1,
     stages: Stages = ALL_STAGES,
+    farthest_views: float | None = None,
 ) -> None:
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     The nearest known pixels in sixteen directions are considered. Those whose surface may continue to the hole are
-    weighted by 1 / distance. The colour is their mean, smoother the farther away they are, plus their surface's fine
-    texture. The disparity is that of one surface, the one with the most weight (a mean of several would lie on none),
-    and then the median of the disparities around. A view that is all hole does not change.
-    photo_disparity: the centre view's. stages: the ones that are on.
+    weighted by 1 / distance; if none may, the farthest counts. The colour is their mean, smoother the farther away they
+    are, plus their surface's fine texture. The disparity is that of one surface, the one with the most weight (a mean
+    of several would lie on none), and then the median of the disparities around. A view that is all hole stays.
+    photo_disparity: the centre view's, which hides what lies behind it; -inf hides nothing. stages: the ones that are
+    on. farthest_views: distance in view steps at which pixels of one surface move apart by at most EDGE_PX, that of
+    the offset by default.
     """
-    one_surface = step_of(EDGE_PX, max(map(abs, offset)))
-    _fill_view(colors, disparity, hole, photo_disparity, offset, one_surface, threads, stages)
-
-
-def continue_farthest(
-    colors: FloatImage,
-    disparity: FloatImage,
-    hole: NDArray[np.bool_],
-    farthest_views: float,
-    stages: Stages = ALL_STAGES,
-) -> None:
-    """Fill the holes of any other picture by the farthest surface around them.
-
-    farthest_views: distance in view steps at which surfaces that move apart by less than EDGE_PX are one surface.
-    """
-    nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
-    one_surface = step_of(EDGE_PX, farthest_views)
-    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), one_surface, 1, stages)
-
-
-def fill_behind(
-    colors: FloatImage,
-    disparity: FloatImage,
-    hole: NDArray[np.bool_],
-    photo_disparity: FloatImage,
-    one_surface: float,
-    threads: int = 1,
-) -> None:
-    """Fill holes of the photo (see `fill_background`) by what lies behind photo_disparity (H, W) there.
-
-    one_surface: largest difference of disparities on one surface.
-    """
-    _fill_view(colors, disparity, hole, photo_disparity, ViewOffset(0.0, 0.0), one_surface, threads, ALL_STAGES)
-
-
-def continues_in_front(
-    disparity: FloatImage,
-    hole: NDArray[np.bool_],
-    photo_disparity: FloatImage,
-    offset: ViewOffset,
-    threads: int = 1,
-) -> NDArray[np.bool_]:
-    """Return where in a hole (H, W) most surfaces that may continue there are in front of its disparity (H, W)."""
-    pixels, _, known = nearest_known(hole, threads)
-    in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
-
-    def weigh(part: slice) -> None:
-        _weigh_in_front(disparity, pixels[part], known[part], photo_disparity, offset, one_surface, in_front)
-
-    in_pieces(weigh, pieces_of(len(pixels), MAX_HOLE_PIXELS_AT_ONCE), threads)
-    return in_front
-
-
-def _fill_view(
-    colors: FloatImage,
-    disparity: FloatImage,
-    hole: NDArray[np.bool_],
-    photo_disparity: FloatImage,
-    offset: ViewOffset,
-    one_surface: float,
-    threads: int,
-    stages: Stages,
-) -> None:
-    """Fill holes, see `fill_background`. one_surface: largest difference of disparities on one surface."""
+    one_surface = step_of(EDGE_PX, farthest_views or max(map(abs, offset)))
     pixels, number, known = nearest_known(hole, threads)
     reach, medians = (np.empty(len(pixels), np.float32) for _ in range(2))
     changed = np.empty((len(pixels), 3), np.float32)
@@ -141,34 +81,63 @@ def _fill_view(
         copy_patches(colors, disparity, wide, pixels, number, one_surface, threads)
 
 
+def continues_in_front(
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    photo_disparity: FloatImage,
+    offset: ViewOffset,
+    threads: int = 1,
+) -> NDArray[np.bool_]:
+    """Return where in a hole (H, W) most surfaces that may continue there are in front of its disparity (H, W)."""
+    pixels, _, known = nearest_known(hole, threads)
+    in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
+
+    def weigh(part: slice) -> None:
+        _weigh_in_front(disparity, pixels[part], known[part], photo_disparity, offset, one_surface, in_front)
+
+    in_pieces(weigh, pieces_of(len(pixels), MAX_HOLE_PIXELS_AT_ONCE), threads)
+    return in_front
+
+
+@kernel
+def _weigh_surfaces(disparity, pixel, known, photo_disparity, offset, one_surface, surface, weight):
+    """Write the disparity of the nearest known pixels around a pixel, and their weight, 1 / distance: 0 without one,
+    negative if its surface cannot continue to this pixel.
+
+    It can only where something nearer hides it from the photo, or outside the photo's frame.
+    """
+    (height, width), (t, s) = disparity.shape, offset
+    y, x = pixel // width, pixel % width
+    for k in range(len(known)):
+        weight[k] = 0.0
+        if known[k] < 0:
+            continue
+        known_y, known_x = known[k] // width, known[k] % width
+        surface[k] = d = disparity[known_y, known_x]
+        weight[k] = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
+        v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
+        is_inside = 0 <= u < width and 0 <= v < height
+        if is_inside and not is_in_front(photo_disparity[v, u], d, one_surface * (SAME_SURFACE_PX / EDGE_PX)):
+            weight[k] = -weight[k]
+
+
 @kernel
 def _fill(colors, disparity, pixels, known, reach, photo_disparity, offset, one_surface):
     """Fill pixels (N,), flat indices, from the nearest known pixels (N, 16), see `fill_background`.
 
     reach (N,): gets the distance of the nearest of these, inf without any.
     """
-    (height, width), (t, s) = disparity.shape, offset
-    photo, directions = photo_disparity.ravel(), known.shape[1]
+    width, directions = disparity.shape[1], known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
-    hidden = one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        farthest, nearest, any_possible = np.inf, np.inf, False
-        # Weights of the surfaces around; negative ones cannot continue to this pixel.
+        _weigh_surfaces(disparity, pixels[i], known[i], photo_disparity, offset, one_surface, surface, weight)
+        farthest, reach[i] = np.inf, np.inf
         for k in range(directions):
-            weight[k] = 0.0
-            if known[i, k] < 0:
-                continue
-            known_y, known_x = known[i, k] // width, known[i, k] % width
-            distance = np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
-            surface[k] = d = disparity[known_y, known_x]
-            farthest, nearest = min(farthest, d), min(nearest, distance)
-            place = _place_in_photo(y + d * t, x + d * s, height, width)
-            is_possible = place < 0 or is_in_front(photo[place], d, hidden)
-            weight[k] = 1.0 / distance if is_possible else -1.0 / distance
-            any_possible = any_possible or is_possible
-        reach[i] = nearest
-        # If no surface can (the disparity contradicts itself), the farthest is the likeliest.
+            if weight[k] != 0:
+                farthest, reach[i] = min(farthest, surface[k]), min(reach[i], 1.0 / abs(weight[k]))
+        # If no surface can continue (the disparity contradicts itself), the farthest is the likeliest.
+        any_possible = weight.max() > 0
         for k in range(directions):
             is_farthest = not any_possible and surface[k] <= farthest
             weight[k] = abs(weight[k]) if is_farthest else max(weight[k], 0.0)
@@ -209,31 +178,15 @@ def _heaviest(surface, weight, one_surface):
 @kernel
 def _weigh_in_front(disparity, pixels, known, photo_disparity, offset, one_surface, in_front):
     """Write `continues_in_front` to in_front (H, W) for pixels (N,) from the nearest known pixels (N, 16)."""
-    (height, width), (t, s) = disparity.shape, offset
-    photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / EDGE_PX)
+    surface, weight = np.zeros(known.shape[1]), np.zeros(known.shape[1])
     for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
+        y, x = pixels[i] // disparity.shape[1], pixels[i] % disparity.shape[1]
+        _weigh_surfaces(disparity, pixels[i], known[i], photo_disparity, offset, one_surface, surface, weight)
         balance = 0.0
-        for k in range(known.shape[1]):
-            if known[i, k] < 0:
-                continue
-            known_y, known_x = known[i, k] // width, known[i, k] % width
-            d = disparity[known_y, known_x]
-            place = _place_in_photo(y + d * t, x + d * s, height, width)
-            if place < 0 or is_in_front(photo[place], d, hidden):
-                likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
-                balance += likely if is_in_front(d, disparity[y, x], one_surface) else -likely
+        for k in range(len(weight)):
+            likely = max(weight[k], 0.0)
+            balance += likely if is_in_front(surface[k], disparity[y, x], one_surface) else -likely
         in_front[y, x] = balance > 0.0
-
-
-@kernel
-def _place_in_photo(y, x, height, width):
-    """Return the flat index of the photo's pixel at a position, -1 outside its frame.
-
-    A surface may continue there only if something nearer hides it from the photo, or outside the frame.
-    """
-    row, column = nearest_pixel(y), nearest_pixel(x)
-    return row * width + column if 0 <= column < width and 0 <= row < height else -1
 
 
 @kernel

@@ -212,27 +212,15 @@ def _blend(hole, number, pixels, first, smooth, change, trust, colors):
     """
     height, width = number.shape
     mean, fine = np.empty(4, np.float32), np.empty(3, np.float32)
-    # For each column around a pixel: the sum of its changes, and their number. The next pixel needs one more column.
-    columns, before = np.empty((2 * FINE_TEXTURE_PX + 1, 4), np.float32), -2
     for i in range(first, min(first + PATCH_BLOCK_PX**2, len(pixels))):
         y, x = pixels[i] // width, pixels[i] % width
-        goes_on = x > 0 and pixels[i] == before + 1
-        before = pixels[i]
-        for u in range(x + FINE_TEXTURE_PX if goes_on else x - FINE_TEXTURE_PX, x + FINE_TEXTURE_PX + 1):
-            column = columns[u % len(columns)]
-            column[:] = 0.0
-            if not 0 <= u < width:
-                continue
-            for v in range(max(y - FINE_TEXTURE_PX, 0), min(y + FINE_TEXTURE_PX + 1, height)):
-                if hole[v, u]:
-                    j = number[v, u]
-                    column[3] += 1
-                    for c in range(3):
-                        column[c] += change[j, c]
         mean[:] = 0.0
-        for k in range(len(columns)):
-            for c in range(4):
-                mean[c] += columns[k, c]
+        for v in range(max(y - FINE_TEXTURE_PX, 0), min(y + FINE_TEXTURE_PX + 1, height)):
+            for u in range(max(x - FINE_TEXTURE_PX, 0), min(x + FINE_TEXTURE_PX + 1, width)):
+                if hole[v, u]:
+                    mean[3] += 1
+                    for c in range(3):
+                        mean[c] += change[number[v, u], c]
         most = np.float32(0.0)
         for c in range(3):
             fine[c] = change[i, c] - mean[c] / mean[3]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pkgutil import resolve_name
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,25 +15,14 @@ EstimateDepth = Callable[[FloatImage], FloatImage]
 """Function that returns inverse depth (H, W), up to scale and offset, of colours (H, W, 3). It may raise InputError."""
 
 
-class Inpainter(Protocol):
-    """Fills the holes of one view. Several threads may call the same inpainter for different views."""
+Inpainter = Callable[[FloatImage, FloatImage, NDArray[np.bool_], FloatImage, ViewOffset, int], None]
+"""Function of (colors, disparity, hole, photo_disparity, offset, threads) that fills the holes of one view in place.
 
-    def __call__(
-        self,
-        colors: FloatImage,
-        disparity: FloatImage,
-        hole: NDArray[np.bool_],
-        photo_disparity: FloatImage,
-        offset: ViewOffset,
-        threads: int = 1,
-    ) -> None:
-        """Write finite colors (H, W, 3), sRGB-encoded, and disparity (H, W), px per view step, where hole (H, W).
-
-        All other pixels stay; values that were in the holes before mean nothing. photo_disparity (H, W): the centre
-        view's, which shows what the photo could not see. offset: position of this view. threads: largest number of
-        threads; the result does not depend on it.
-        """
-
+It writes finite colors (H, W, 3), sRGB-encoded, and disparity (H, W), px per view step, where hole (H, W) is True. All
+other pixels stay; values that were in the holes before mean nothing. photo_disparity (H, W): the centre view's, which
+shows what the photo could not see. offset: position of this view. threads: largest number of threads; the result does
+not depend on it. Several threads may call the same inpainter for different views.
+"""
 
 INPAINTERS = {"background": "iibr_core.inpainting.background:fill_background"}
 """Place of each inpainter, "module:name"."""

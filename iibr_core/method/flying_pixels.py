@@ -38,11 +38,13 @@ UNREACHED_DETAIL = 1e6
 """Detail that no pixel of a view exceeds."""
 
 
-def measure_detail(photo: FloatImage) -> FloatImage:
-    """Return how far (H, W) each pixel of a photo (H, W, 3) is, in any channel, from the median of its 3x3 pixels."""
-    detail = np.empty(photo.shape[:2], np.float32)
-    rows = np.pad(photo, ((1, 1), (1, 1), (0, 0)), "edge").reshape(len(photo) + 2, -1)
-    in_bands(lambda first, last: _measure(rows, first, last, detail), image_size(detail))
+def measure_detail(photo: FloatImage, tears: NDArray[np.bool_]) -> FloatImage:
+    """Return how far (H, W) each pixel of a photo (H, W, 3) is, in any channel, from the median of its 3x3 pixels.
+
+    tears (H, W): where rays may be torn off. All other pixels have UNREACHED_DETAIL.
+    """
+    detail = np.where(tears, np.float32(0.0), np.float32(UNREACHED_DETAIL))
+    in_bands(lambda first, last: _measure(photo, tears, first, last, detail), image_size(detail))
     return detail
 
 
@@ -73,23 +75,13 @@ def without_flying_pixels(
 
 
 @kernel
-def _measure(rows, first, last, detail):
-    """Write rows [first, last) of `measure_detail`. rows (H + 2, 3 W + 6): the photo with a border of one pixel."""
-    stands_out = np.empty(3 * detail.shape[1], np.float32)
+def _measure(photo, tears, first, last, detail):
+    """Write rows [first, last) of `measure_detail`."""
     for y in range(first, last):
-        above, here, below = rows[y], rows[y + 1], rows[y + 2]
-        # All channels of a row at once: left and right are three values away.
-        for k in range(len(stands_out)):
-            upper = _ordered(above[k], above[k + 3], above[k + 6])
-            middle = _ordered(here[k], here[k + 3], here[k + 6])
-            lower = _ordered(below[k], below[k + 3], below[k + 6])
-            stands_out[k] = abs(here[k + 3] - _middle(upper, middle, lower))
         for x in range(detail.shape[1]):
-            detail[y, x] = 0.0
-            for k in range(3 * x, 3 * x + 3):
-                # Infinite values cannot be compared: their difference is NaN, which fails the test.
-                if detail[y, x] < stands_out[k] < np.inf:
-                    detail[y, x] = stands_out[k]
+            if tears[y, x]:
+                for channel in range(3):
+                    detail[y, x] = max(detail[y, x], abs(photo[y, x, channel] - _median(photo, y, x, channel)))
 
 
 @kernel
@@ -120,14 +112,8 @@ def _median(colors, y, x, channel):
     upper = _ordered(colors[above, left, channel], colors[above, x, channel], colors[above, right, channel])
     middle = _ordered(colors[y, left, channel], colors[y, x, channel], colors[y, right, channel])
     lower = _ordered(colors[below, left, channel], colors[below, x, channel], colors[below, right, channel])
-    return float(_middle(upper, middle, lower))
-
-
-@kernel
-def _middle(upper, middle, lower):
-    """Return the median of nine values, ordered by threes."""
     low, high = max(upper[0], middle[0], lower[0]), min(upper[2], middle[2], lower[2])
-    return _ordered(low, _ordered(upper[1], middle[1], lower[1])[1], high)[1]
+    return float(_ordered(low, _ordered(upper[1], middle[1], lower[1])[1], high)[1])
 
 
 @kernel

@@ -88,7 +88,12 @@ class ViewMaker:
         nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
         wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
     ) -> Generator[ViewUpdate]:
-        """Yield every view of a grid, in the form of storage; see the function `generate`."""
+        """Yield every view of a grid once, in the form of storage: the photo's, the farthest, then those nearest to
+        `nearest_to()`.
+
+        wanted: called once, after the photo's view was taken; returns the offsets of the views to make, None for all.
+        Pixels do not depend on the order of the views. The generator ends once the job is stopped.
+        """
         with suppress(Cancelled):
             nothing = np.zeros(image_size(self._photo), np.bool_)
             yield ViewUpdate(*grid.centre, encode_for_storage(self._photo, is_hdr), self._disparity, nothing)
@@ -100,8 +105,7 @@ class ViewMaker:
 
             def stored(rays: RaySet, offset: ViewOffset, view: View) -> ViewUpdate:
                 colors = finished_colors(rays, offset, view, encode_for_storage(view.colors, is_hdr, 1))
-                (v, u), (t, s) = grid.centre, offset
-                return ViewUpdate(v + round(t), u + round(s), colors, view.disparity, view.inpainted)
+                return ViewUpdate(*grid.index_of(offset), colors, view.disparity, view.inpainted)
 
             for rays, offset, view in self._complete():
                 if offset in views:
@@ -145,25 +149,6 @@ def view_maker(
     load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, estimate_depth)
     outer = outer_views_of_grid(plan.grid)
     return ViewMaker(photo.pixels, disparity.values, outer, load, stages, plan.has_disocclusion)
-
-
-def generate(
-    photo: Photo,
-    disparity: Disparity,
-    plan: ScenePlan,
-    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
-    inpaint: str = DEFAULT_INPAINTER,
-    estimate_depth: EstimateDepth | None = None,
-    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
-) -> Generator[ViewUpdate]:
-    """Yield every view of `plan.grid` once: the photo's, then the farthest ones, then those nearest to `nearest_to()`.
-
-    Arguments of `view_maker`. wanted: called once, after the photo's view was taken; returns the offsets of the views
-    to make, None for all. Pixels do not depend on the order of the views. The generator ends once the job is stopped.
-    Raises InputError if the transformer's weights cannot be read or there is no such way of inpainting.
-    """
-    maker = view_maker(photo, disparity, plan, inpaint, estimate_depth)
-    return maker.generate(plan.grid, photo.is_hdr, nearest_to, wanted)
 
 
 def encode_for_storage(encoded: FloatImage, is_hdr: bool, threads: int | None = None) -> StoredColors:

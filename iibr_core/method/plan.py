@@ -36,8 +36,6 @@ STILL_PX = 0.5
 """Parallax across the whole grid that cannot be seen, in pixels: the scene is flat."""
 MIN_PLANNED_EDGE_PX = 1.5
 """Parallax between neighbouring pixels in the outermost view from which on they are two surfaces, in pixels."""
-EDGE_REACH_PX = 3
-"""Distance of a pixel from a depth edge that counts as near, in pixels."""
 MAX_COMFORTABLE = 2.0
 """Multiple of the parallax for viewing above which a disparity that is taken as given gets a note."""
 MAX_NOISE_PX = 1.0
@@ -66,7 +64,7 @@ class ScenePlan:
 
     grid: stored views. disparity_scale, disparity_zero: the field's disparity is (given - zero) * scale. given_range:
     farther and nearer ones count as its ends; None if all count as they are. disparity_range_px: least and greatest
-    field disparity (px per view step). edge_fraction: share of pixels near a depth edge. has_disocclusion: whether any
+    field disparity (px per view step). edge_fraction: share of pixels at a depth edge. has_disocclusion: whether any
     view shows what the photo hides. field_bytes: memory of the light field. reasons: the same in sentences. notes:
     sentences that the user should read.
     """
@@ -188,17 +186,10 @@ def _complete_plan(
 
 
 def _edge_share(moved_px: FloatImage) -> float:
-    """Return the share of pixels near a depth edge, of a map (H, W) in px of parallax in the outermost view."""
+    """Return the share of pixels at a depth edge, of a map (H, W) in px of parallax in the outermost view."""
     is_edge = np.zeros(moved_px.shape, np.bool_)
     is_edge[:, 1:] = np.abs(np.diff(moved_px, axis=1)) > MIN_PLANNED_EDGE_PX
     is_edge[1:] |= np.abs(np.diff(moved_px, axis=0)) > MIN_PLANNED_EDGE_PX
-    for _ in range(EDGE_REACH_PX):
-        near = is_edge.copy()
-        near[1:] |= is_edge[:-1]
-        near[:-1] |= is_edge[1:]
-        near[:, 1:] |= is_edge[:, :-1]
-        near[:, :-1] |= is_edge[:, 1:]
-        is_edge = near
     return float(is_edge.mean())
 
 
@@ -239,7 +230,7 @@ def _outlier_reasons(given: FloatImage, span: DisparityRange) -> list[str]:
 
 def _edge_reasons(edge_share: float, has_disocclusion: bool, inpaint: str, outer_views: int) -> list[str]:
     """Return how much lies near edges, and what fills the holes behind them."""
-    near_edges = f"{edge_share:.1%} of the pixels lie near a depth edge; "
+    near_edges = f"{edge_share:.1%} of the pixels lie at a depth edge; "
     if not has_disocclusion:
         return [near_edges + "nothing is disoccluded, so nothing is inpainted."]
     name = inpaint.partition(":")[0]

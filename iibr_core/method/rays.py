@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.outpainting import outpaint
-from iibr_core.method.flying_pixels import TEARING_GAP_PX, UNREACHED_DETAIL, measure_detail
+from iibr_core.method.flying_pixels import TEARING_GAP_PX, measure_detail
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.method.steep_surfaces import BELOW, RIGHT, is_joined, join_steep_rays
 from iibr_core.runtime.kernels import kernel
@@ -38,13 +38,14 @@ MIN_STEP_PX = 0.1
 class RayArrays(NamedTuple):
     """The rays of S images, as one argument of kernels.
 
+    photo_images: number of images, from the first on, that hold what the photo shows; the others are inpainted.
     offsets (S, 2): viewpoint (t, s) of each image. colors (S, H, W, 3): sRGB-encoded. disparity (S, H, W): NaN without
     a surface. coverage (S, H, W): share of the pixel that the ray fills, 0 = no ray. near_edge (S, H, W): whether a
     look-up of 4x4 pixels may meet two surfaces. low, high (S, M, N): least and greatest disparity of cells of CELL_PX x
-    CELL_PX pixels, (inf, -inf) without rays; row_ranges (S, M, 2): the same of whole rows of cells. photo_images:
-    number of images, from the first on, that hold what the photo shows; the others are inpainted.
+    CELL_PX pixels, (inf, -inf) without rays; row_ranges (S, M, 2): the same of whole rows of cells.
     """
 
+    photo_images: int
     offsets: NDArray[np.float64]
     colors: FloatImage
     disparity: FloatImage
@@ -53,7 +54,6 @@ class RayArrays(NamedTuple):
     low: FloatImage
     high: FloatImage
     row_ranges: FloatImage
-    photo_images: int
 
 
 class RaysBehind(NamedTuple):
@@ -90,11 +90,10 @@ class RaySet:
         self.photo_images, self._count = 0, 0
         self.photo_disparity = self.photo_detail = self.cell_steps = np.empty((0, 0), np.float32)
         cells = -(-size.height // CELL_PX), -(-size.width // CELL_PX)
-        floats = (*size, 3), size, size, size, cells, cells, (cells[0], 2)
-        colors, disparity, coverage, near_edge, *of_cells = (
-            np.empty((capacity, *shape), np.float32 if k != 3 else np.bool_) for k, shape in enumerate(floats)
-        )
-        self._room = RayArrays(np.empty((capacity, 2)), colors, disparity, coverage, near_edge, *of_cells, 0)
+        shapes = (*size, 3), size, size, cells, cells, (cells[0], 2)
+        colors, disparity, coverage, *of_cells = (np.empty((capacity, *shape), np.float32) for shape in shapes)
+        near_edge = np.empty((capacity, *size), np.bool_)
+        self._room = RayArrays(0, np.empty((capacity, 2)), colors, disparity, coverage, near_edge, *of_cells)
         self.joined, self.steep = np.zeros(size, np.uint8), np.zeros(cells, np.bool_)
 
     def add(
@@ -154,8 +153,8 @@ class RaySet:
     @property
     def arrays(self) -> RayArrays:
         """The rays added so far."""
-        *room, _ = self._room
-        return RayArrays(*(part[: self._count] for part in room), self.photo_images)
+        added: list[Any] = [part[: self._count] for part in self._room[1:]]
+        return RayArrays(self.photo_images, *added)
 
     def to_view(self, offset: ViewOffset) -> NDArray[np.float64]:
         """Return the steps (S, 2) from each image to the view at `offset`."""
@@ -205,7 +204,7 @@ def rays_of_photo(
     rays, everywhere = RaySet(2 + more, size, farthest_views, margins, stages), np.ones(size, np.bool_)
     if stages.remove_flying_pixels:
         tears = near_steps(disparity, step_of(TEARING_GAP_PX, farthest_views))
-        rays.photo_detail = np.where(tears, measure_detail(colors), np.float32(UNREACHED_DETAIL))
+        rays.photo_detail = measure_detail(np.ascontiguousarray(colors), tears)
     if not stages.split_mixed_pixels:
         rays.add(centre, colors, disparity, everywhere)
         return rays

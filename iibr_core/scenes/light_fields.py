@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from iibr_core.beyond.between_views import GivenView, densify, read_given_views, require_steps
+from iibr_core.beyond.between_views import densify, read_given_views, require_steps
 from iibr_core.depth.multi_view.all_views import carry
 from iibr_core.depth.multi_view.estimate import estimate_coarse
 from iibr_core.depth.multi_view.matching import FINDING
@@ -212,7 +212,7 @@ def _with_disparity_of(settled: Settled) -> tuple[Settled, FloatImage, tuple[str
 
 def read_dense(
     field: MultiView, grid: GridShape, inpaint: str
-) -> tuple[Sequence[GivenView], int, Generator[ViewUpdate]]:
+) -> tuple[Sequence[ViewUpdate], int, Generator[ViewUpdate]]:
     """Read the views of a light field, and begin to make views between them.
 
     Return its own views, the middle one first; the number of steps from one of them to the next; and all views.

@@ -6,13 +6,12 @@ import pytest
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.patch_synthesis import MAX_TEXTURE
-from iibr_core.method.light_field import generate
 from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.plan import plan_for_viewing, plan_literal
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.types import GridShape, ViewOffset
-from tests.iibr_core.scenes import by_index, disparity_of, photo_of, smooth_texture, square_before_wall
+from tests.iibr_core.scenes import by_index, disparity_of, generate, photo_of, smooth_texture, square_before_wall
 
 HEIGHT, WIDTH = 20, 26
 GRID = GridShape(3, 3)

@@ -1,14 +1,13 @@
 import numpy as np
 import pytest
 
-from iibr_core.beyond.between_views import GivenView, densify, require_steps
+from iibr_core.beyond.between_views import densify, require_steps
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.method.light_field import generate
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
-from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from tests.iibr_core.scenes import by_index, disparity_of, generate, literal_plan, photo_of, smooth_texture
 
 SPARSE, DENSE = GridShape(3, 3), GridShape(5, 5)
 SIZE = ImageSize(72, 90)
@@ -25,13 +24,13 @@ def drawn_views(grid, scene):
 
 
 def flat_view(row, column, grey, disparity=0.0, size=(12, 16)):
-    return GivenView(row, column, np.full((*size, 3), grey, np.uint8), np.full(size, disparity, np.float32))
+    return ViewUpdate(row, column, np.full((*size, 3), grey, np.uint8), np.full(size, disparity, np.float32))
 
 
 def test_views_between_are_better_than_from_the_centre_alone_and_given_ones_come_back():
     scene = random_scene(np.random.default_rng(11), SIZE, 2.0)
     sparse, dense = drawn_views(SPARSE, scene), drawn_views(DENSE, scene)
-    given = [GivenView(*at, colors, 2 * disparity) for at, (colors, disparity) in sparse.items()]
+    given = [ViewUpdate(*at, colors, 2 * disparity) for at, (colors, disparity) in sparse.items()]
     made = by_index(list(densify(given, SPARSE, DENSE)))
     assert set(made) == set(dense)
     assert all((made[2 * row, 2 * column].colors == colors).all() for (row, column), (colors, _) in sparse.items())
@@ -52,7 +51,7 @@ def test_what_no_given_view_shows_is_inpainted_once_and_shared():
         slit = slice(34 - 10 * column, 38 - 10 * column)
         disparity[8:32], colors[8:32] = 10.0, (200, 30, 30)
         disparity[:, slit], colors[:, slit] = 0.0, wall[:, slit]
-        given.append(GivenView(0, column, colors, disparity))
+        given.append(ViewUpdate(0, column, colors, disparity))
     views = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 6))))
     completing, beside = views[0, 2], views[0, 3]
     # The slit stands at 30 .. 33 and 28 .. 31: both see the wall at 30 and 31.
@@ -91,14 +90,14 @@ def test_the_centre_comes_first_given_or_not_and_every_view_once(sparse, dense):
     # Maps of noise: all views that complete the rays have something to add.
     grey = np.full((12, 16, 3), 90, np.uint8)
     noise = np.random.default_rng(0)
-    given = [GivenView(*at, grey, noise.uniform(-9, 9, (12, 16)).astype(np.float32)) for at in np.ndindex(sparse)]
+    given = [ViewUpdate(*at, grey, noise.uniform(-9, 9, (12, 16)).astype(np.float32)) for at in np.ndindex(sparse)]
     places = [(view.row, view.column) for view in densify(given, sparse, dense)]
     assert places[0] == dense.centre
     assert sorted(places) == list(np.ndindex(dense))
 
 
 def test_hdr_views_stay_hdr():
-    given = [GivenView(0, u, np.full((12, 16, 3), 4.0, np.float16), np.zeros((12, 16), np.float32)) for u in (0, 1)]
+    given = [ViewUpdate(0, u, np.full((12, 16, 3), 4.0, np.float16), np.zeros((12, 16), np.float32)) for u in (0, 1)]
     middle = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 3))))[0, 1]
     assert middle.colors.dtype == np.float16
     assert np.abs(middle.colors - 4.0).max() < 0.01

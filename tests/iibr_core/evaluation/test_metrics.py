@@ -12,11 +12,10 @@ from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_lin
 from iibr_core.evaluation.lpips import Lpips
 from iibr_core.evaluation.metrics import MAX_DB, bounded_psnr, flip, psnr, ssim
 from iibr_core.evaluation.refocus import FocalStack, Focus, foci_of
-from iibr_core.method.light_field import generate
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.known_scenes import WALL, disparity_of_square, offsets_of
 from tests.iibr_core.lens_scenes import GRID, NAMES, lens_scene
-from tests.iibr_core.scenes import literal_plan, smooth_texture
+from tests.iibr_core.scenes import generate, literal_plan, smooth_texture
 
 
 def pair(seed: int = 0, size: tuple[int, int] = (24, 30)) -> tuple[np.ndarray, np.ndarray]:

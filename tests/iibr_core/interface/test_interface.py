@@ -14,14 +14,13 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.interface.fields import LensViews
-from iibr_core.method.light_field import generate
 from iibr_core.method.plan import plan_literal
 from iibr_core.method.view import View as MadeView
 from iibr_core.scenes.scene import Scene as OpenScene
 from iibr_core.scenes.scene import Source
 from iibr_core.types import Disparity, GridShape, InputError, Photo
 from tests.iibr_core import red_inpainter
-from tests.iibr_core.scenes import square_before_wall
+from tests.iibr_core.scenes import generate, square_before_wall
 from tests.iibr_core.unequal_rows import SQUARE_PX, write_unequal_rows
 
 PAGE = Path(__file__).parents[3] / "docs" / "python.md"

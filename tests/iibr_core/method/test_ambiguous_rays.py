@@ -6,9 +6,9 @@ from iibr_core.method.ambiguous_rays import (
     FAINT_WEIGHT,
     MIN_COLOR_CHANGE,
     MIN_HYPOTHESIS_WEIGHT,
+    SHARE,
     blend,
     find_ambiguous_rays,
-    hypothesis_colors,
 )
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form
@@ -28,11 +28,12 @@ def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
     rays = rays_of_photo(photo.pixels, disparity, 2.0, 0)
     if not fringe:  # which pixels are mixed is a matter of colour
         rays = ray_set(disparity, colors=photo.pixels, farthest=2.0)
-    height = photo.size[0]
+    height, width = photo.size
     candidates = find_candidates(rays, offset, (0, height))
     weights, _ = closed_form(candidates)
     shown = look_up(rays, candidates, weights)
-    return find_ambiguous_rays(rays, candidates, weights, shown, (0, height), every=every), weights, rays
+    asked = np.ones((height, width), np.bool_)
+    return find_ambiguous_rays(rays, candidates, weights, shown, asked, every), weights, rays
 
 
 def motley(size, seed=0):
@@ -99,7 +100,8 @@ def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
     weights /= weights.sum(axis=1, keepdims=True)
     colors, disparities, source = blend(rays, ambiguous, weights)
     kept = np.where(weights > MIN_HYPOTHESIS_WEIGHT, weights, 0)
-    light = (kept[..., None] * linear_from_srgb(hypothesis_colors(rays, ambiguous))).sum(axis=1)
+    alone = [blend(rays, ambiguous, slot * ambiguous.mask)[0] for slot in np.eye(weights.shape[1], dtype=np.float32)]
+    light = (kept[..., None] * linear_from_srgb(np.stack(alone, axis=1))).sum(axis=1)
     assert colors == pytest.approx(srgb_from_linear(light / kept.sum(axis=1, keepdims=True)), abs=1e-4)
     at = np.arange(len(weights)), weights.argmax(axis=1)
     assert (disparities == ambiguous.disparity[at]).all()
@@ -111,7 +113,7 @@ def test_a_transformer_that_repeats_the_closed_form_changes_nothing():
     rays = rays_of_photo(photo.pixels, disparity.values, 2.0, 0)
 
     def repeat(ambiguous):
-        share = ambiguous.share + 1e-9 * ambiguous.mask
+        share = ambiguous.features[..., SHARE] + 1e-9 * ambiguous.mask
         return (share / share.sum(axis=1, keepdims=True)).astype(np.float32)
 
     one, two = Renderer().render(rays, OFFSET), Renderer(repeat).render(rays, OFFSET)

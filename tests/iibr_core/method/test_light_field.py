@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.method.light_field import generate
 from iibr_core.runtime import tiling
 from iibr_core.types import ViewOffset
 from tests.iibr_core import red_inpainter
-from tests.iibr_core.scenes import by_index, literal_plan, smooth_texture, square_before_wall
+from tests.iibr_core.scenes import by_index, generate, literal_plan, smooth_texture, square_before_wall
 
 
 def views_of(photo, disparity, rows, columns=None, **options):

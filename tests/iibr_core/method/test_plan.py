@@ -15,7 +15,6 @@ from iibr_core.method.farthest_views import (
 )
 from iibr_core.method.memory import scene_bytes
 from iibr_core.method.plan import (
-    EDGE_REACH_PX,
     MAX_VIEWS_A_SIDE,
     STEP_PX,
     PlanOverrides,
@@ -69,11 +68,11 @@ def test_depth_edges_are_steps_of_one_and_a_half_pixels_in_the_outermost_view(st
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_pixels_near_a_step_up_or_down_either_way_count(axis, sign):
+def test_pixels_at_a_step_up_or_down_either_way_count(axis, sign):
     photo, disparity = square_before_wall()
     values = sign * 2.0 * (np.indices(disparity.values.shape)[axis] >= 30)
     plan = plan_literal(photo, disparity_of(values), GridShape(3, 3))
-    assert plan.edge_fraction == pytest.approx((2 * EDGE_REACH_PX + 1) / values.shape[axis])
+    assert plan.edge_fraction == pytest.approx(1 / values.shape[axis])
 
 
 def test_less_memory_gives_fewer_views(monkeypatch):

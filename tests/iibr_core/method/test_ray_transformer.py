@@ -62,7 +62,7 @@ def squared_errors(seed, spoil):
         candidates = find_candidates(rays, offset, (0, SIZE.height))
         weights, share = closed_form(candidates)
         shown = look_up(rays, candidates, weights)
-        ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, (0, SIZE.height))
+        ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, np.ones(SIZE, np.bool_))
         # Where less is covered, T is not asked: what was filled behind shows there, too.
         asked = share[tuple(ambiguous.pixel.T)] >= FULLY_COVERED
         ambiguous = ambiguous.chosen(asked)
@@ -104,8 +104,7 @@ def random_ambiguous(rays=200, seed=0):
     number = random.integers(1, HYPOTHESES + 1, rays).astype(np.uint8)
     features = random.uniform(-3, 3, (rays, HYPOTHESES, FEATURES)).astype(np.float32)
     pixel, nothing = np.zeros((rays, 2), np.int64), np.zeros((rays, HYPOTHESES), np.float32)
-    source = nothing.astype(np.uint8)
-    return AmbiguousRays(OFFSETS[0], pixel, number, nothing[:, 0], nothing, source, nothing, nothing, features)
+    return AmbiguousRays(OFFSETS[0], pixel, number, nothing, nothing.astype(np.uint8), features)
 
 
 @pytest.fixture

@@ -51,9 +51,9 @@ def test_edges_and_cells(size, unknown):
     rays = RaySet(1, ImageSize(*size), FARTHEST)
     rays.add(CENTRE, np.zeros((*size, 3), np.float32), disparity, coverage)
     assert (rays.arrays.near_edge[0] == slow_near_edge(disparity)).all()
-    assert (rays.cells.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
-    assert (rays.cells.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
-    assert rays.cells.step == pytest.approx(slow_steps(disparity))
+    assert (rays.arrays.low[0] == slow_cells(np.where(coverage > 0, disparity, np.inf), np.min)).all()
+    assert (rays.arrays.high[0] == slow_cells(np.where(coverage > 0, disparity, -np.inf), np.max)).all()
+    assert rays.cell_steps == pytest.approx(slow_steps(disparity))
 
 
 @pytest.mark.parametrize("margins", [Margins(), Margins(3, 2, 0, 4)])
@@ -75,7 +75,7 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_
             expected[top : y + GUARD_BAND_PX + 1, left : x + GUARD_BAND_PX + 1] = 0
     np.testing.assert_array_equal(rays.arrays.coverage, [np.ones(size), coverage, expected])
     seen = np.where(expected > 0, made_up, np.float32(-np.inf))
-    np.testing.assert_array_equal(rays.cells.high[2], slow_cells(seen, np.max))
+    np.testing.assert_array_equal(rays.arrays.high[2], slow_cells(seen, np.max))
     assert 0 < expected.sum() < coverage.sum()
 
 

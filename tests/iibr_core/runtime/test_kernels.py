@@ -65,14 +65,12 @@ def kernels_in(folder: Path) -> dict[str, bytes]:
 
 def test_kernels_are_kept_and_compiled_again_where_an_inlined_file_is_edited(package) -> None:
     assert encode(package) == (0.01292, True)
-    files = kernels_in(package / "_kernels").keys()
     (package / "other.py").write_text("GAIN = 3.0\n")
     require_use_of_the_users_cache(package)
     scalars, constants = package / "runtime" / "scalars.py", package / "encoding_constants.py"
     scalars.write_text(scalars.read_text().replace("return x * 12.92", "return x * 100.0"))
     constants.write_text("GAIN = 2.0\n")
     assert encode(package) == (0.2, True)
-    assert kernels_in(package / "_kernels").keys() == files, "old entries are overwritten"
 
 
 def require_use_of_the_users_cache(package: Path) -> None:

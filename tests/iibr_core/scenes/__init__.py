@@ -1,7 +1,11 @@
 """Small scenes with known answers."""
 
+from collections.abc import Generator
+
 import numpy as np
 
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER
+from iibr_core.method.light_field import view_maker
 from iibr_core.method.plan import ScenePlan, plan_literal
 from iibr_core.types import Disparity, GridShape, Photo, ViewUpdate
 
@@ -49,3 +53,8 @@ def literal_plan(photo: Photo, disparity: Disparity, rows: int, columns: int | N
 
 def by_index(updates: list[ViewUpdate]) -> dict[tuple[int, int], ViewUpdate]:
     return {(update.row, update.column): update for update in updates}
+
+
+def generate(photo: Photo, disparity: Disparity, plan: ScenePlan, inpaint=DEFAULT_INPAINTER, **options) -> Generator:
+    """Yield the views of a plan. options: those of `ViewMaker.generate`."""
+    return view_maker(photo, disparity, plan, inpaint).generate(plan.grid, photo.is_hdr, **options)

@@ -12,10 +12,9 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.method.farthest_views import outer_views_of_grid
-from iibr_core.method.light_field import generate
 from iibr_core.types import ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, lens_scene
-from tests.iibr_core.scenes import by_index, literal_plan
+from tests.iibr_core.scenes import by_index, generate, literal_plan
 from tests.viewer.gpu.scenes import open_field
 
 MIN_DB = {"shelf": 43.4, "fence": 40.4}
