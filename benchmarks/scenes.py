@@ -23,7 +23,8 @@ from iibr_core.formats.light_fields.light_field_formats import find_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.resample import resample_map
-from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import render
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
 
 MAX_PIXELS = 150_000

@@ -24,7 +24,8 @@ from iibr_core.method.view import Renderer
 from iibr_core.training.degradation import degrade
 from iibr_core.training.distributions import log_uniform
 from iibr_core.training.losses import color_loss, to_perceptual
-from iibr_core.training.scenes.random_scene import RaycastScene, cast, random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import RaycastScene, cast, render
 from iibr_core.training.trainer import Batch
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 

@@ -7,7 +7,7 @@ from math import inf, sqrt
 import numpy as np
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.training.scenes.textures import inside_pattern, noise, pattern, rough_noise
+from iibr_core.training.scenes.textures import noise, pattern, rough_noise
 
 PLANE, BOX, BALL, WIRE = range(4)
 """A rectangle, a box, an ellipsoid, the side of a cylinder along its third axis."""
@@ -89,7 +89,7 @@ def normal_at(shape, x, y, z, hx, hy, hz):
 @kernel
 def albedo_at(p, x, y, z, pixel):
     """Colour of a primitive at a point of its own frame, linear light; see textures for `pixel`."""
-    x, y, z = inside_pattern(x) + p.phase[0], inside_pattern(y) + p.phase[1], inside_pattern(z) + p.phase[2]
+    x, y, z = x + p.phase[0], y + p.phase[1], z + p.phase[2]
     # Mix of pattern and rough noise between two colours of the palette; coarse noise tints it with the third.
     rough = rough_noise(x, y, z, p.wavelength, p.gain, pixel, p.seed)
     share = pattern(p.pattern, x, y, z, p.period, pixel, p.seed + 11)

@@ -1,6 +1,6 @@
 """Random scenes to learn from: layers of slanted planes, boxes, balls, wires, meshes and leaves before a background.
 
-`random_scene` makes one; `render` and `cast` (see raycast) show it from any view, with exact colours and disparities.
+`raycast` shows them from any view, with exact colours and disparities.
 """
 
 from __future__ import annotations
@@ -15,18 +15,9 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb
 from iibr_core.training.distributions import log_uniform
 from iibr_core.training.scenes.primitives import BALL, BOX, PLANE, PRIMITIVE, WIRE
-from iibr_core.training.scenes.raycast import (
-    RaycastScene,
-    cast,
-    disparity_at,
-    is_visible_from,
-    render,
-    sample_places,
-)
+from iibr_core.training.scenes.raycast import RaycastScene
 from iibr_core.training.scenes.textures import DISC, FRAME, LACE, LEAVES, MESH, PATTERNS, WHOLE
 from iibr_core.types import ImageSize
-
-__all__ = ["RaycastScene", "cast", "disparity_at", "is_visible_from", "random_scene", "render", "sample_places"]
 
 OBJECTS = (3, 60)
 DEPTH_RATIO = (1.25, 5.0)
@@ -44,10 +35,7 @@ def random_scene(rng: np.random.Generator, size: ImageSize, largest_disparity: f
     """A scene for pictures of (height, width); none of its disparities, in any view, exceeds +-largest_disparity.
 
     largest_disparity: px per view step, the limit on one side of the zero plane; on the other it is some part of it.
-    Raises ValueError if the size has no pixel or largest_disparity is negative or not finite.
     """
-    if min(size) < 1 or not 0 <= largest_disparity < np.inf:
-        raise ValueError(f"size {size}, largest disparity {largest_disparity}: give pixels, and 0 or more")
     bounds = _random_bounds(rng, size, largest_disparity)
     primitives = _backdrop_planes(bounds)
     if largest_disparity > 0:

@@ -11,7 +11,7 @@ from math import inf, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import srgb_scalar
@@ -21,13 +21,8 @@ from iibr_core.training.scenes.textures import is_cut
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 CHUNK_PIXELS = 4096
-FARTHEST = 1e7
-"""Positions (px) and view offsets are cast no farther out than this."""
-SAME_POINT_PX = 1e-3
-"""Disparities that differ by no more are of one point."""
 COARSE_PATTERN_COSINE = 0.5
 """A surface seen at a smaller cosine than this gets a coarser pattern; above, the samples of a pixel average it."""
-TENT_STEPS = sqrt(6.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,93 +44,52 @@ class RaycastScene:
     ambient: float
 
 
-def render(
-    scene: RaycastScene, size: ImageSize, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
-) -> tuple[FloatImage, FloatImage]:
-    """The view at an offset: colours (H, W, 3), sRGB-encoded, and disparity (H, W), exact at pixel centres.
+def render(scene: RaycastScene, size: ImageSize, offset: ViewOffset, samples: int = 3) -> tuple[FloatImage, FloatImage]:
+    """Return the view at an offset: colours (H, W, 3), sRGB-encoded, and disparity (H, W), exact at pixel centres.
 
     size: (height, width). See `cast`.
     """
     y, x = np.indices(size)
-    colors, disparity = cast(scene, x.ravel(), y.ravel(), offset, samples, blur_px)
+    colors, disparity = cast(scene, x.ravel(), y.ravel(), offset, samples)
     return colors.reshape(*size, 3), disparity.reshape(size)
 
 
 def cast(
-    scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
+    scene: RaycastScene, x: NDArray[Any], y: NDArray[Any], offset: ViewOffset, samples: int = 3
 ) -> tuple[FloatImage, FloatImage]:
-    """Colours (N, 3), sRGB-encoded, and disparities (N,) of the pixels centred at (x, y), px, of the view at an offset.
+    """Return colours (N, 3), sRGB-encoded, and disparities (N,) of pixels centred at (x, y), (N,), px, of a view.
 
-    x, y: (N,), any real positions. samples: squared, the rays of a pixel, averaged in linear light over its square.
-    blur_px: how much wider the lens spreads a pixel (standard deviation, px). The disparity is that of the pixel's
-    centre. Finite whatever the input. Raises ValueError if x and y differ in shape or there is no sample.
+    samples: odd; squared, the rays of a pixel, averaged in linear light over its square. The disparity is that of the
+    pixel's centre.
     """
-    x, y = np.atleast_1d(_clamp_finite(x)), np.atleast_1d(_clamp_finite(y))
-    if x.shape != y.shape or x.ndim != 1 or samples < 1:
-        raise ValueError(f"x is {x.shape}, y {y.shape}, samples {samples}: give equal (N,) and at least one sample")
+    x, y = x.astype(np.float64), y.astype(np.float64)
     colors, disparity = np.empty((len(x), 3), np.float32), np.empty(len(x), np.float32)
-    places, weights = sample_places(samples, blur_px)
-    rays = places, weights, float(np.abs(places).max())
-    view = _view_of(scene, offset)
+    places, view = _sample_places(samples), _view_of(scene, offset)
 
     def chunk(first: int) -> None:
         part = slice(first, first + CHUNK_PIXELS)
-        _cast(x[part], y[part], rays, view, colors[part], disparity[part])
+        _cast(x[part], y[part], places, view, colors[part], disparity[part])
 
     in_pieces(chunk, range(0, len(x), CHUNK_PIXELS), THREADS)
     return colors, disparity
 
 
-def disparity_at(scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset) -> FloatImage:
-    """Disparities (N,) seen at the positions (x, y), (N,), px, of the view at an offset."""
-    return cast(scene, x, y, offset, samples=1)[1]
-
-
-def is_visible_from(
-    scene: RaycastScene,
-    x: ArrayLike,
-    y: ArrayLike,
-    disparity: ArrayLike,
-    offset: ViewOffset,
-    other: ViewOffset = ViewOffset(0.0, 0.0),  # noqa: B008 (immutable)
-) -> NDArray[np.bool_]:
-    """(N,): whether the points at (x, y) with this disparity in one view are seen from another, in frame or not.
-
-    True disocclusion is its negation.
-    """
-    x, y, d = (np.asarray(a, np.float64) for a in (x, y, disparity))
-    across, down = offset.s - other.s, offset.t - other.t
-    there = disparity_at(scene, x + d * across, y + d * down, other)
-    return np.abs(there - d) <= SAME_POINT_PX
-
-
-def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:
-    """Return values in double precision, NaN as 0, infinite and far ones within +-FARTHEST."""
-    return np.clip(np.nan_to_num(np.asarray(values, np.float64)), -FARTHEST, FARTHEST)
-
-
-def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return offsets (S, 2) of a pixel's rays in (x, y), px, the centre first; and their weights (S,), sum 1.
+def _sample_places(samples: int) -> NDArray[np.float64]:
+    """Return offsets (S, 2) of a pixel's rays in (x, y), px, the centre first.
 
     All rays differ in x and in y, so that edges in rows and columns are mixed in samples**2 steps.
     """
     i, j = (a.ravel() for a in np.indices((samples, samples)))
-    q = np.stack([(i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples], axis=-1)
-    tent = np.where(q < 0.5, np.sqrt(2 * q) - 1, 1 - np.sqrt(2 * (1 - q)))
-    places = q - 0.5 + max(blur_px, 0.0) * TENT_STEPS * tent
-    weights = np.full(len(q), 1 / len(q))
-    centre = len(q) // 2
-    if samples % 2:
-        order = np.r_[centre, np.delete(np.arange(len(q)), centre)]
-        places[centre] = 0.0
-        return places[order], weights
-    return np.concatenate([np.zeros((1, 2)), places]), np.r_[0.0, weights]
+    places = np.stack([(i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples], axis=-1) - 0.5
+    centre = len(places) // 2
+    places[centre] = 0.0
+    return places[np.r_[centre, np.delete(np.arange(len(places)), centre)]]
 
 
 def _view_of(scene: RaycastScene, offset: ViewOffset) -> tuple[Any, ...]:
     """Return primitives, axes, origins, bounds, camera, lens (centre x, y, focal, infinity, depths) and light."""
     primitives = scene.primitives
-    camera = _clamp_finite([offset.s, offset.t, 0.0])
+    camera = np.array([offset.s, offset.t, 0.0])
     axes = np.ascontiguousarray(primitives["axes"])
     origins = np.einsum("nij,nj->ni", axes, camera - primitives["centre"])
     lens = np.array([*scene.centre_px, scene.focal_px, scene.infinity_px, *scene.depths])
@@ -172,9 +126,9 @@ def _find_met(bounds, x, y, margin, met):
 
 
 @kernel
-def _cast(xs, ys, rays, view, colors, disparity):
-    """Write what `cast` returns. rays: `sample_places` and their largest distance. view: `_view_of`."""
-    places, weights, margin = rays
+def _cast(xs, ys, places, view, colors, disparity):
+    """Write what `cast` returns. places: `_sample_places`. view: `_view_of`."""
+    weight, margin = 1.0 / len(places), np.abs(places).max()
     primitives, axes, origins, bounds, camera, lens, light = view
     focal, infinity, least_z, greatest_z = lens[2], lens[3], lens[4], lens[5]
     backdrop = len(primitives) - 1
@@ -205,11 +159,9 @@ def _cast(xs, ys, rays, view, colors, disparity):
                     u, v = origins[k, 0] + z * ex, origins[k, 1] + z * ey
                     if p.cut == 0 or not is_cut(p.cut, u, v, hx, hy, p.cut_period, p.cut_width, p.seed):
                         depth, hit = z, k
-            # The first sample is the pixel's centre: exact disparity, even where it adds no colour (weight 0).
+            # The first sample is the pixel's centre.
             if sample == 0:
                 disparity[n] = focal / depth - infinity
-            if weights[sample] == 0.0:
-                continue
             # Shading: the point in its primitive's frame, the normal there, turned back into the world.
             p = primitives[hit]
             ex = axes[hit, 0, 0] * wx + axes[hit, 0, 1] * wy + axes[hit, 0, 2]
@@ -232,6 +184,6 @@ def _cast(xs, ys, rays, view, colors, disparity):
             facing = -1.0 if p.shape == PLANE and towards > 0 else 1.0
             lit = max(facing * (nx * light[0] + ny * light[1] + nz * light[2]), 0.0)
             # Lambert's law and ambient light; samples are summed in linear light.
-            lit = weights[sample] * (light[3] + (1 - light[3]) * lit)
+            lit = weight * (light[3] + (1 - light[3]) * lit)
             red, green, blue = red + lit * r, green + lit * g, blue + lit * b
         colors[n, 0], colors[n, 1], colors[n, 2] = srgb_scalar(red), srgb_scalar(green), srgb_scalar(blue)

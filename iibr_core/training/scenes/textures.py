@@ -22,8 +22,6 @@ OCTAVE_RATIO = 2.17
 FINEST_NOISE_PX = (0.8, 1.6)
 """Noise whose lattice is this many pixels wide is left out altogether, or just not at all."""
 FINEST_PERIOD_PX = (1.5, 3.0)
-FARTHEST = 1e7
-"""Patterns end here, in world units: beyond, positions have no digits left for detail."""
 
 
 @kernel
@@ -134,12 +132,6 @@ def pattern(kind, x, y, z, period, pixel, seed):
 
 
 @kernel
-def inside_pattern(x):
-    """A coordinate that patterns can work with: itself, or 0 where it is not finite or too large."""
-    return x if abs(x) < FARTHEST else 0.0
-
-
-@kernel
 def _leaf(x, y, angle, seed):
     """Whether a point lies on the one leaf of its cell of a turned unit grid."""
     # The turned grid; then place, direction and length of the leaf in its cell.
@@ -167,10 +159,10 @@ def is_cut(kind, x, y, half_x, half_y, period, width, seed):
         u, v = (x + half_x) / period, (y + half_y) / period
         return (u - floor(u)) * period > width and (v - floor(v)) * period > width
     if kind == LEAVES:
-        x, y = inside_pattern(x) / period, inside_pattern(y) / period
+        x, y = x / period, y / period
         # Three layers of leaves, turned and scaled against each other: they overlap irregularly.
         return not (_leaf(x, y, 0.3, seed) or _leaf(1.3 * x, 1.3 * y, 1.1, seed + 1) or _leaf(x, y, 2.0, seed + 2))
     if kind == LACE:
-        x, y = inside_pattern(x) / period, inside_pattern(y) / period
+        x, y = x / period, y / period
         return noise(x, y, 0.5, seed) + 0.5 * noise(2.3 * x, 2.3 * y, 0.5, seed + 1) < 0.75
     return False

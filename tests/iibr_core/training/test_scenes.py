@@ -4,7 +4,8 @@ from scipy.ndimage import gaussian_filter
 
 from iibr_core.training.degradation import blur, coarsen, degrade, misalign
 from iibr_core.training.scenes.primitives import BOX, PLANE, PRIMITIVE, WIRE
-from iibr_core.training.scenes.random_scene import RaycastScene, cast, disparity_at, random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import RaycastScene, cast, render
 from iibr_core.types import ImageSize, ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
@@ -61,7 +62,7 @@ def test_box_and_wire_against_small_steps_along_the_ray():
     y, x = (a.ravel() for a in np.indices(SIZE))
     depths = np.linspace(5, GREATEST_Z, 4000)
     for shape, extent in ((BOX, half), (WIRE, round_half)):
-        seen = depth_at(disparity_at(scene_of(primitive(shape, centre, extent, axes)), x, y, CENTRE))
+        seen = depth_at(cast(scene_of(primitive(shape, centre, extent, axes)), x, y, CENTRE, samples=1)[1])
         assert 100 < (seen < GREATEST_Z - 1).sum() < len(x) / 2
         for n in range(0, len(x), 37):
             local = (world(x[n], y[n], FOCAL / depths - INFINITY) - centre) @ axes.T

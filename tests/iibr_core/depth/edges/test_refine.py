@@ -9,7 +9,8 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.method.flying_pixels import measure_detail
 from iibr_core.method.mixed_pixels import split_mixed_pixels
 from iibr_core.training.degradation import blur, coarsen, quantise
-from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import render
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 

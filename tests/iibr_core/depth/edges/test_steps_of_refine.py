@@ -10,7 +10,8 @@ from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.maps.resample import has_soft_edges, resample_map
 from iibr_core.training.degradation import blur
-from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import render
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 from tests.iibr_core.depth.edges.test_refine import disc_before_slope
 from tests.iibr_core.scenes import smooth_texture
