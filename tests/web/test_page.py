@@ -136,22 +136,6 @@ def test_it_shows_in_a_frame_that_may_do_next_to_nothing(tab, page, tmp_path) ->
     assert len(tab.requests) <= 1, "the frame's page"
 
 
-def test_a_tap_focuses_where_it_lands_and_r_resets(shown) -> None:
-    shown.resize(480, 640)  # the bar lies below the picture
-    wait_until_still(shown)
-    top = (640 - 480 * HEIGHT / WIDTH) / 2
-    lens = "['focus', 'aperture'].map(name => document.getElementById(name).valueAsNumber)"
-    found = []
-    for x, y in ((240, 320), (20, top + 20)):
-        shown.drag((x, y))
-        found.append(shown.evaluate(lens))
-        shown.press("r")
-    (near, opened), (far, _) = found
-    assert near > far, "the square lies before the wall"
-    assert opened > 0
-    assert shown.evaluate(lens)[1] == 0
-
-
 def test_fingers_on_a_phone_move_the_viewpoint_and_zoom(tab, page) -> None:
     tab.resize(390, 844, ratio=2, is_phone=True)
     tab.open(page.as_uri())
@@ -210,17 +194,6 @@ def test_it_swings_until_touched_unless_that_is_unwanted(tab, page) -> None:
     wait_until_still(tab)
 
 
-@pytest.mark.parametrize(
-    "name", ["<script>document.title='ran'</script>", '" onerror="document.title=1 a&amp;b ünï 光']
-)
-def test_names_are_words(tab, tmp_path, name) -> None:
-    photo = write_scene(tmp_path, name.replace("/", "∕"))
-    tab.open(export(photo).as_uri())
-    wait_until_still(tab)
-    assert tab.evaluate("document.title") == photo.stem
-    assert photo.stem in tab.evaluate("document.getElementById('view').getAttribute('aria-label')")
-
-
 def test_the_policy_lets_nothing_else_run(shown) -> None:
     shown.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"document.title=1\">')")
     shown.evaluate("fetch('https://example.org').catch(() => 0)")
@@ -241,21 +214,6 @@ HIDE_DECODER, HIDE_VIDEO = "delete globalThis.VideoDecoder;", "delete HTMLMediaE
 NO_FRAMES = "HTMLVideoElement.prototype.requestVideoFrameCallback = () => 1;"
 NO_SEEKS = "Object.defineProperty(HTMLMediaElement.prototype, 'onseeked', { set() {} });"
 QUICK_TIMERS = "{ const given = setTimeout; globalThis.setTimeout = (call, ms) => given(call, ms / 20); }"
-
-
-def test_a_stepped_video_shows_the_same_as_a_decoder(tab, shown, page) -> None:
-    """Pages that come by plain http have no WebCodecs in most browsers."""
-    set_lens(shown, *SETTINGS[1])
-    wait_until_still(shown)
-    tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_DECODER)
-    decoded = canvas(shown)
-    tab.open(page.as_uri())
-    wait_until_still(tab)
-    assert tab.evaluate("typeof VideoDecoder") == "undefined"
-    assert tab.evaluate("+document.documentElement.dataset.views") == 9
-    set_lens(tab, *SETTINGS[1])
-    wait_until_still(tab)
-    assert psnr(canvas(tab), decoded) >= MIN_PSNR_OF_HALVES_DB
 
 
 def test_frames_that_no_queue_announces_are_shown(tab, page) -> None:
