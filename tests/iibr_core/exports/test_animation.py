@@ -101,6 +101,8 @@ def test_paths_are_closed_and_move(source, motion) -> None:
     steps = np.linalg.norm(np.diff(around, axis=0, append=around[:1]), axis=1)
     assert steps.max() > 0.01
     assert steps[-1] <= steps.max(), "no leap from the last to the first"
+    if motion == "focus":
+        assert (around[:, 2].min(), around[:, 2].max()) == pytest.approx(source.scene.disparity_range_px)
     assert all(0 <= optics.aperture_diameter <= aperture_limit(source.scene) for optics in path)
 
 

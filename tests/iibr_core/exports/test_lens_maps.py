@@ -4,13 +4,16 @@ import pytest
 from scipy.ndimage import binary_erosion
 
 from iibr_core.beyond.lens_slices import slices_of
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import convert, srgb_from_linear
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.exports.full_picture import encode_light
+from iibr_core.exports.full_drawing import draw_full
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.kinds import ExportOptions, export_kind
 from iibr_core.exports.source import open_for_export, write_export
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import DISPLAY_P3, SRGB, GridShape, InputError
 from tests.iibr_core.exports.conftest import exported
 from tests.viewer.conftest import write_scene
@@ -56,6 +59,22 @@ def test_a_tilted_lens_has_its_focus_elsewhere_at_each_border(source, tmp_path):
     optics = {"aperture_diameter": 2.0, "focus_tilt": (0.5, 0.0)}
     radius = values_of(exported(source, "blur", tmp_path / "a.exr", optics))[0]
     np.testing.assert_allclose((disparity - radius)[0, [0, -1]], [-0.5, 0.5], atol=0.01)
+
+
+@pytest.mark.parametrize("aperture", [0.0, 2.0])
+def test_what_lies_behind_is_drawn_at_the_photos_own_size_where_the_lens_is_open(tmp_path, aperture):
+    kind, tiles = export_kind("blur"), []
+    given = Source(str(write_scene(tmp_path)), DepthChoice(refine=False), GridShape(3, 3), max_pixels=96 * 64 // 4)
+    opened = open_for_export(kind, ExportOptions(), given, 1.0, LensChoice(), lambda scene: None, None)
+
+    def draw(settings):
+        tiles.append(settings.tile)
+        return np.zeros((settings.size_px.height, settings.size_px.width, 3), np.float32)
+
+    optics, size = Optics(aperture_diameter=aperture), ScreenSize(96, 64)
+    assert is_full(opened.scene, optics, size)
+    draw_full(FullPicture(opened.scene, opened.plan(), opened.loaded, optics, size), draw)
+    assert [tile.hidden is not None for tile in tiles] == [aperture > 0]
 
 
 def test_light_is_brought_to_the_colours_of_a_file():

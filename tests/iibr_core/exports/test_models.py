@@ -1,6 +1,7 @@
 """Splats as SPZ, read by the format's description, and textured meshes, read by trimesh."""
 
 import gzip
+import json
 import math
 import struct
 from pathlib import Path
@@ -171,6 +172,10 @@ def test_a_mesh_has_the_photos_camera_and_its_picture_at_its_own_size(tmp_path) 
     scene = trimesh.load_scene(tmp_path / "a.glb", process=False)
     vertical = math.radians(scene.camera.fov[1])
     assert math.tan(vertical / 2) == pytest.approx(16 / cameras_of(source).focal_px)
-    texture = meshes_of(tmp_path / "a.glb")[0].visual.material.baseColorTexture.convert("RGB")
+    photo_mesh, content = meshes_of(tmp_path / "a.glb")[0], (tmp_path / "a.glb").read_bytes()
+    corners = json.loads(content[20 : 20 + struct.unpack_from("<I", content, 12)[0]])["accessors"][0]
+    unmoved = photo_mesh.vertices / (nearest_metres(source) or 1.0)
+    np.testing.assert_allclose([corners["min"], corners["max"]], [unmoved.min(0), unmoved.max(0)], rtol=1e-5)
+    texture = photo_mesh.visual.material.baseColorTexture.convert("RGB")
     assert texture.size == (96, 64)
     assert np.abs(np.asarray(texture).astype(int) - Image.open(photo.path)).mean() < 2

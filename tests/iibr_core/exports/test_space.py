@@ -63,7 +63,8 @@ def test_the_three_layouts_say_the_same(source, tmp_path) -> None:
         assert Image.open(folders["nerfstudio"] / frame["file_path"]).size == (96, 64)
         matrix = np.array(frame["transform_matrix"])
         place = colmap[Path(frame["file_path"]).name] * [1, -1, -1]
-        np.testing.assert_allclose(matrix[:3, 3], place, atol=1e-12)
+        np.testing.assert_allclose(matrix[:, 3], [*place, 1], atol=1e-12)
+        assert not matrix[3, :3].any()
         assert (frame["cx"], frame["cy"]) == (48, 32)
     poses = np.load(folders["llff"] / "poses_bounds.npy")
     assert poses.shape == (9, 17)

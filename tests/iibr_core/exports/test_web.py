@@ -20,7 +20,7 @@ from iibr_core.formats.images.metadata import caption_in
 from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.scenes.f_numbers import equivalent_f_number
 from iibr_core.scenes.lens_choice import LensChoice
-from iibr_core.scenes.lens_limits import aperture_limit, first_aperture, focus_limits
+from iibr_core.scenes.lens_limits import aperture_limit, first_aperture, focus_limits, focus_span
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
 from tests.iibr_core.embedded_files import packet
@@ -92,6 +92,7 @@ def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
     assert field["focusLimits"] == pytest.approx(
         [views.size.width / 96 * limit for limit in focus_limits(opened.scene)]
     )
+    assert field["rangeLimits"] == pytest.approx([0, views.size.width / 96 * focus_span(opened.scene)])
     with pytest.raises(InputError, match="budget"):
         page_of(opened, budget=10_000)
 

@@ -8,7 +8,7 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import Arrangement
-from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.light_fields.views import read_views, view_offsets
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.scenes.light_fields import find_disparity
@@ -215,6 +215,9 @@ def test_a_step_of_stanford_is_the_spacing_of_columns_else_of_rows(tmp_path, row
     for at, offset in offsets_by_index(scene).items():
         np.testing.assert_allclose(offset, np.subtract(positions[at], positions[0, 0]) / step)
     assert scene.notes == ("Viewpoints from the names.",)
+    every_second = write_archive(tmp_path / "thin", {at: positions[at] for at in positions if not any(np.mod(at, 2))})
+    places = np.array(view_offsets(every_second))
+    assert np.ptp(places, axis=0)[1 if columns > 1 else 0] == pytest.approx(1), "in steps of the views that are there"
 
 
 def test_middlebury_pair_from_the_left(tmp_path) -> None:
