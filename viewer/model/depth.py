@@ -20,7 +20,7 @@ from iibr_core.depth.editing.edits import (
     Stroke,
 )
 from iibr_core.scenes.lens_limits import clamp
-from iibr_core.scenes.scene import DepthSettings
+from iibr_core.scenes.scene import DepthSettings, Scene
 from viewer.model.history import record_edit, undoable
 from viewer.model.inspection import set_overlay
 from viewer.model.messages import Notice, notify
@@ -67,13 +67,13 @@ NO_DEPTH_HERE = "The depth of a light field from disk cannot be edited. Open a p
 
 
 @undoable
-def set_refine(state: AppState, is_on: bool) -> AppState:
+def set_refine(state: AppState, scene: Scene, is_on: bool) -> AppState:
     """Move depth edges to the photo's edges, or leave them as they are."""
     return _with_settings(state, replace(state.depth, refine=is_on)) if _is_editable(state) else state
 
 
 @undoable
-def set_tone(state: AppState, tone: DepthEdits, is_finished: bool) -> AppState:
+def set_tone(state: AppState, scene: Scene, tone: DepthEdits, is_finished: bool) -> AppState:
     """Invert, clip and bend the disparity; strokes of `tone` do not count. Only the preview shows unfinished edits."""
     if not _is_editable(state):
         return state
@@ -82,11 +82,9 @@ def set_tone(state: AppState, tone: DepthEdits, is_finished: bool) -> AppState:
 
 
 @undoable
-def reset(state: AppState) -> AppState:
+def reset(state: AppState, scene: Scene) -> AppState:
     """Go back to the depth that was found."""
-    if state.scene is None or not _is_editable(state):
-        return state
-    return _with_settings(state, DepthSettings(state.scene.source.depth.refine))
+    return _with_settings(state, DepthSettings(scene.source.depth.refine)) if _is_editable(state) else state
 
 
 def set_brush(state: AppState, brush: Brush) -> AppState:

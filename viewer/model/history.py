@@ -8,7 +8,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Concatenate, ParamSpec
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.scenes.scene import AS_FOUND, DepthSettings
+from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Scene
 
 if TYPE_CHECKING:
     from viewer.model.app_state import AppState
@@ -55,12 +55,18 @@ def record_edit(before: AppState, after: AppState, kind: str, always: bool = Fal
     return replace(after, history=History(past, (), kind, kind))
 
 
-def undoable(verb: Callable[Concatenate[AppState, P], AppState]) -> Callable[Concatenate[AppState, P], AppState]:
-    """Return a verb whose edit can be undone. Steps of one gesture by the same verb are one edit."""
+def undoable(
+    verb: Callable[Concatenate[AppState, Scene, P], AppState],
+) -> Callable[Concatenate[AppState, P], AppState]:
+    """Return the verb that changes the open scene's state by this function; without a scene it changes nothing.
+
+    Its edit can be undone. Steps of one gesture by the same verb are one edit.
+    """
 
     @wraps(verb)
     def recorded(state: AppState, /, *args: P.args, **kwargs: P.kwargs) -> AppState:
-        return record_edit(state, verb(state, *args, **kwargs), verb.__name__)
+        scene = state.scene
+        return state if scene is None else record_edit(state, verb(state, scene, *args, **kwargs), verb.__name__)
 
     return recorded
 

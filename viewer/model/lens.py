@@ -62,12 +62,11 @@ def _edited(state: AppState, scene: Scene, optics: Optics) -> AppState:
 def _lens_setter(name: str) -> Setter[Any]:
     """Return the verb that sets a field of the optics, see `Optics`."""
 
-    def verb(state: AppState, value: Any, /) -> AppState:
-        if state.scene is None:
-            return state
-        return record_edit(state, _edited(state, state.scene, replace(state.optics, **{name: value})), name)
+    def verb(state: AppState, scene: Scene, value: Any, /) -> AppState:
+        return _edited(state, scene, replace(state.optics, **{name: value}))
 
-    return verb
+    verb.__name__ = name
+    return undoable(verb)
 
 
 def _still(state: AppState) -> AppState:
@@ -84,37 +83,33 @@ def _without_rack(state: AppState) -> AppState:
 
 
 @undoable
-def move_eye(state: AppState, eye: ViewOffset) -> AppState:
+def move_eye(state: AppState, scene: Scene, eye: ViewOffset) -> AppState:
     """Put the viewpoint at a view offset."""
-    return _edited(_still(state), state.scene, replace(state.optics, eye=eye)) if state.scene else state
+    return _edited(_still(state), scene, replace(state.optics, eye=eye))
 
 
 @undoable
-def set_dolly(state: AppState, dolly: float) -> AppState:
+def set_dolly(state: AppState, scene: Scene, dolly: float) -> AppState:
     """Step into the picture; see `Optics.dolly`."""
-    return _edited(_still(state), state.scene, replace(state.optics, dolly=dolly)) if state.scene else state
+    return _edited(_still(state), scene, replace(state.optics, dolly=dolly))
 
 
 @undoable
-def reset(state: AppState) -> AppState:
+def reset(state: AppState, scene: Scene) -> AppState:
     """Reset viewpoint, focus, aperture and light; gloss stays."""
-    if state.scene is None:
-        return state
     state = replace(_still(state), free_camera=None, tilt_handles=None, has_chosen_aperture=False)
     state = replace(state, chosen_focus=None, focus_before=None, focused_at=None)
-    return _edited(state, state.scene, Optics(gloss=state.optics.gloss)) if state.scene else state
+    return _edited(state, scene, Optics(gloss=state.optics.gloss))
 
 
 # Focus
 
 
-def set_focus(state: AppState, disparity: float) -> AppState:
+@undoable
+def set_focus(state: AppState, scene: Scene, disparity: float) -> AppState:
     """Focus on a field disparity (px per view step) in the middle of the picture."""
-    if state.scene is None:
-        return state
-    focused = _edited(_without_rack(state), state.scene, replace(state.optics, focus_disparity=disparity))
-    focused = replace(focused, chosen_focus=focused.optics.focus_disparity, focused_at=None)
-    return record_edit(state, _opened(focused, state.scene), "set_focus")
+    focused = _edited(_without_rack(state), scene, replace(state.optics, focus_disparity=disparity))
+    return _opened(replace(focused, chosen_focus=focused.optics.focus_disparity, focused_at=None), scene)
 
 
 def focus_on(state: AppState, place: focal_plane.Place, disparity: float) -> AppState:
@@ -139,11 +134,11 @@ def show_tilt_handles(state: AppState, is_shown: bool) -> AppState:
 
 
 @undoable
-def move_tilt_handle(state: AppState, index: int, place: focal_plane.Place, disparity: float | None) -> AppState:
+def move_tilt_handle(
+    state: AppState, scene: Scene, index: int, place: focal_plane.Place, disparity: float | None
+) -> AppState:
     """Drag a handle (0 or 1) to a place; the plane of focus runs through the disparity there, None if unknown."""
-    scene, handles = state.scene, state.tilt_handles or TiltHandles()
-    if scene is None:
-        return state
+    handles = state.tilt_handles or TiltHandles()
     x, y = (clamp(value, -1.0, 1.0) for value in place)
     old, kept = (handles.first, handles.second) if index == 0 else (handles.second, handles.first)
     disparity = focal_plane.sharp_disparity(state.optics, old) if disparity is None else disparity
@@ -164,21 +159,17 @@ def _opened(state: AppState, scene: Scene) -> AppState:
 
 
 @undoable
-def set_aperture(state: AppState, diameter: float) -> AppState:
+def set_aperture(state: AppState, scene: Scene, diameter: float) -> AppState:
     """Open the aperture to a diameter in view steps."""
-    if state.scene is None:
-        return state
     opened = replace(state, has_chosen_aperture=True)
-    return _edited(opened, state.scene, replace(state.optics, aperture_diameter=diameter))
+    return _edited(opened, scene, replace(state.optics, aperture_diameter=diameter))
 
 
 @undoable
-def apply_preset(state: AppState, name: PresetName) -> AppState:
+def apply_preset(state: AppState, scene: Scene, name: PresetName) -> AppState:
     """Set focus and aperture for a purpose."""
-    if state.scene is None:
-        return state
-    optics = preset_optics(name, state.optics, state.scene, subject_disparity(state, state.scene))
-    return _edited(replace(state, has_chosen_aperture=True, tilt_handles=None), state.scene, optics)
+    optics = preset_optics(name, state.optics, scene, subject_disparity(state, scene))
+    return _edited(replace(state, has_chosen_aperture=True, tilt_handles=None), scene, optics)
 
 
 set_aperture_shape: Setter[ApertureShape] = _lens_setter("aperture_shape")
@@ -192,10 +183,9 @@ def show_before(state: AppState, is_shown: bool) -> AppState:
 
 
 @undoable
-def set_depth_strength(state: AppState, strength: float, is_finished: bool) -> AppState:
+def set_depth_strength(state: AppState, scene: Scene, strength: float, is_finished: bool) -> AppState:
     """Multiply the planned parallax. is_finished: the edit is over, so the field is made again."""
-    restarts = is_finished and state.source is not None
-    generation = state.generation + 1 if restarts else state.generation
+    generation = state.generation + 1 if is_finished else state.generation
     return replace(state, depth_strength=clamp(strength, 0.0, DEPTH_STRENGTH_LIMIT), generation=generation)
 
 
@@ -220,10 +210,10 @@ def take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:
 
 
 @undoable
-def paint_gloss(state: AppState, place: tuple[float, float], brush: GlossBrush, begins: bool) -> AppState:
+def paint_gloss(state: AppState, scene: Scene, place: tuple[float, float], brush: GlossBrush, begins: bool) -> AppState:
     """Begin a stroke of the gloss brush at a place (x, y), in shares of the photo's size, or continue the last one."""
-    gloss, scene = state.optics.gloss, state.scene
-    if gloss is None or scene is None:
+    gloss = state.optics.gloss
+    if gloss is None:
         return state
     strokes, place = gloss.surface.strokes, (clamp(place[0], -1.0, 2.0), clamp(place[1], -1.0, 2.0))
     stroke = GlossStroke((place,), brush.radius, brush.erases)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes.scene import Scene, Source
 from viewer.model import folder
 from viewer.model.app_state import AppState
 from viewer.model.history import undoable
@@ -53,11 +53,9 @@ def paste_look_to(state: AppState, steps: int) -> AppState:
 
 
 @undoable
-def paste_look(state: AppState) -> AppState:
+def paste_look(state: AppState, scene: Scene) -> AppState:
     """Give the open picture the look that was copied; viewpoint, focus, gloss and strokes stay its own."""
-    scene, look = state.scene, state.look
-    if scene is None:
-        return state
+    look = state.look
     if look is None:
         return notify(state, Notice(NO_LOOK))
     optics = replace(

@@ -119,19 +119,19 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
 
 
 @undoable
-def take_settings(state: AppState, settings: SavedSettings) -> AppState:
+def take_settings(state: AppState, scene: Scene, settings: SavedSettings) -> AppState:
     """Take over the optics that a picture was saved with, made to fit the open scene."""
-    return _with_settings(state, settings)
+    return _with_settings(state, scene, settings)
 
 
 @undoable
-def restore_session(state: AppState, settings: SavedSettings, lost: str = "") -> AppState:
+def restore_session(state: AppState, scene: Scene, settings: SavedSettings, lost: str = "") -> AppState:
     """Restore what the open photo was left with: the lens, the depth edits, the depth strength, and its depth model.
 
     lost: reason why the model cannot be used, "" if it can. The place in focus then stays sharp at its depth now.
     """
-    scene, restored = state.scene, _with_settings(state, settings)
-    if scene is None or restored is state:
+    restored = _with_settings(state, scene, settings)
+    if restored is state:
         return state
     has_aperture = settings.optics.aperture_diameter > 0
     restored = replace(restored, chosen_focus=restored.optics.focus_disparity, has_chosen_aperture=has_aperture)
@@ -246,10 +246,10 @@ def _leave_source(state: AppState) -> AppState:
     return replace(state, source=state.scene.source, generation=state.generation + 1)
 
 
-def _with_settings(state: AppState, settings: SavedSettings) -> AppState:
-    if state.scene is None or not is_finite(settings.optics):
+def _with_settings(state: AppState, scene: Scene, settings: SavedSettings) -> AppState:
+    if not is_finite(settings.optics):
         return state
-    optics = clamp_optics(settings.optics_at(state.scene.width), state.scene)
+    optics = clamp_optics(settings.optics_at(scene.width), scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
     return replace(state, optics=optics, notices=notices, motion=state.motion.stopped)
 

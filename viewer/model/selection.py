@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from iibr_core.depth.editing.edits import MAX_PATCHES, MAX_POINTS, BrushTool, Patch, Stroke
+from iibr_core.scenes.scene import Scene
 from viewer.model import lens
 from viewer.model.app_state import AppState
 from viewer.model.depth import Brush
@@ -75,7 +76,7 @@ def surface_stroke(tool: BrushTool, chosen: Selection, brush: Brush) -> Stroke:
 
 
 @undoable
-def move(state: AppState, is_forward: bool) -> AppState:
+def move(state: AppState, scene: Scene, is_forward: bool) -> AppState:
     """Move the selected surface nearer or farther by MOVE_SHARE of the range of depth."""
     if state.selection is None or state.stroke is not None:
         return state

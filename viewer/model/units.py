@@ -72,9 +72,3 @@ def far_percent(scene: Scene, disparity: float) -> float:
     """Return the position of a field disparity from 0, the nearest possible focus, to 100, the farthest."""
     low, high = focus_limits(scene)
     return 100 * (high - disparity) / (high - low)
-
-
-def disparity_at_percent(scene: Scene, percent: float) -> float:
-    """Return the field disparity of a position, the inverse of `far_percent`."""
-    low, high = focus_limits(scene)
-    return high - percent / 100 * (high - low)

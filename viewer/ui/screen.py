@@ -14,8 +14,7 @@ from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures
 from viewer.model.layout import Layout
 from viewer.ui.overlays.chips import chips, panel_handle
 from viewer.ui.overlays.filmstrip import filmstrip
-from viewer.ui.overlays.inspection_overlay import draw_inspection
-from viewer.ui.overlays.minimap import draw_minimap
+from viewer.ui.overlays.inspection_overlay import draw_inspection, draw_minimap
 from viewer.ui.overlays.notice_corner import notices
 from viewer.ui.overlays.prompt_overlay import prompts
 from viewer.ui.overlays.reticle import draw_marks

@@ -52,20 +52,26 @@ def slider(
     tip: str = "",
     is_logarithmic: bool = False,
     is_enabled: bool = True,
+    unit: float = 1.0,
+    zero: float = 0.0,
 ) -> float:
-    """Build a row with a slider; return its value. form: printf-like. Ctrl+click types a value."""
+    """Build a row with a slider; return its value. form: printf-like. Ctrl+click types a value.
+
+    unit, zero: the slider shows (value - zero) / unit.
+    """
+    low, high, shown = ((number - zero) / unit for number in (*limits, value))
     imgui.begin_disabled(not is_enabled)
     label(text, tip)
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if is_logarithmic else 0)
     for which in (imgui.Col_.slider_grab, imgui.Col_.slider_grab_active):
         imgui.push_style_color(which, 0)
-    is_changed, new = imgui.slider_float(f"##{text}", value, *limits, form, flags)
+    is_changed, new = imgui.slider_float(f"##{text}", shown, low, high, form, flags)
     imgui.pop_style_color(2)
-    low, high, at = (math.log(max(number, 1e-9)) for number in (*limits, new)) if is_logarithmic else (*limits, new)
+    low, high, at = (math.log(max(number, 1e-9)) if is_logarithmic else number for number in (low, high, new))
     _draw_track((at - low) / (high - low) if high > low else 0.0)
     imgui.end_disabled()
     tooltip(tip)
-    return float(new) if is_changed else value
+    return float(new) * unit + zero if is_changed else value
 
 
 def _draw_track(share: float) -> None:
@@ -88,9 +94,14 @@ def percent_slider(
     is_logarithmic: bool = False,
 ) -> float:
     """Build a row with a slider for a share, shown in per cent; return the share."""
-    low, high = limits
-    percent = slider(text, 100 * share, (100 * low, 100 * high), form, tip, is_logarithmic, is_enabled)
-    return share if percent == 100 * share else percent / 100
+    return slider(text, share, limits, form, tip, is_logarithmic, is_enabled, unit=0.01)
+
+
+def depth_slider(text: str, disparity: float, limits: tuple[float, float], form: str, tip: str) -> float:
+    """Build a row with a slider from near to far, from 0 to 100; return the disparity. limits: (far, near)."""
+    far, near = limits
+    words, unit = f"near  ·  {form}  ·  far", (far - near) / 100 or 1.0
+    return slider(text, disparity, (near, far), words, tip, unit=unit, zero=near)
 
 
 def checkbox(text: str, is_on: bool, tip: str = "") -> bool:
@@ -132,6 +143,17 @@ def choices(
             pressed = entry
         imgui.end_disabled()
     return pressed
+
+
+def switch(
+    verb: Callable[[AppState, Item | None], AppState],
+    entries: Mapping[Item, tuple[str, str]],
+    chosen: Item | None,
+    greyed: Collection[object] = (),
+) -> list[Action]:
+    """Build buttons as `choices`, one of them lit; return the action that chooses the pressed one, or none if lit."""
+    pressed = choices(entries, [chosen], greyed=greyed)
+    return [] if pressed is None else [do(verb, None if pressed == chosen else pressed)]
 
 
 def combo(name: str, shown: str, entries: Sequence[tuple[str, str]], tip: str = "") -> int | None:

@@ -129,7 +129,7 @@ def test_the_panel_says_how_the_photo_was_taken(open_window, tmp_path):
 def test_about_opens_the_page_of_releases_only_when_that_is_asked_for(viewer, monkeypatch):
     opened = []
     pages = {"Releases": "https://example.org/releases", "Documentation": "https://example.org/docs"}
-    monkeypatch.setattr("viewer.ui.overlays.about_prompt.program_pages", lambda: pages)
+    monkeypatch.setattr("viewer.ui.overlays.prompt_overlay.program_pages", lambda: pages)
     monkeypatch.setattr("viewer.app.side_effects.typer.launch", lambda place, locate: opened.append(place))
     viewer.send("key", "F1")
     viewer.until(lambda app: app.state.prompt == "help")

@@ -13,7 +13,6 @@ from tests.viewer.model.test_opening import plan_of, scene_of
 from viewer.model.inspection import Hover
 from viewer.model.units import (
     disparity_at,
-    disparity_at_percent,
     distance_limits,
     f_number_text,
     far_percent,
@@ -111,8 +110,6 @@ def test_near_is_0_far_is_100_and_back():
     scene = scene_of()
     low, high = focus_limits(scene)
     assert (far_percent(scene, high), far_percent(scene, low)) == (0.0, 100.0)
-    for percent in (0.0, 12.5, 100.0):
-        assert far_percent(scene, disparity_at_percent(scene, percent)) == pytest.approx(percent)
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,18 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import TOLERANCE_LIMITS
 from iibr_core.exports import kinds
-from iibr_core.exports.kinds import EXPORTS, AnimationKind, ExportKind, ExportOptions, Purpose
+from iibr_core.exports.kinds import EXPORTS, AnimationKind, DepthLayout, ExportKind, ExportOptions, Purpose
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.scenes.lens_limits import clamp, focus_span
 from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
 from viewer.model import messages, saving
 from viewer.model.action import Action, do
@@ -57,8 +59,8 @@ class _Export:
     picked: tuple[float, float] | None = None
 
 
-Row = Callable[[ExportOptions, _Export], ExportOptions]
-"""Function that draws a row and returns the options as the user changed them."""
+Row = Callable[[ExportOptions, _Export], Any]
+"""Function that draws a row for an option and returns its value, changed by the user or not."""
 
 
 def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
@@ -113,7 +115,9 @@ def _option_rows(options: ExportOptions, export: _Export, is_advanced: bool) -> 
     filled = edited = kinds.with_defaults(export.kind, options, export.scene, export.optics)
     for name, row in ROWS.items():
         if name in export.kind.supports and (is_advanced or name not in ADVANCED_ROWS):
-            edited = row(edited, export)
+            edited = replace(edited, **{name: row(edited, export)})
+    if edited.rate != filled.rate:  # the length stays
+        edited = replace(edited, frames=_frames_in(filled.frames / filled.rate, edited.rate))
     values = {field.name: getattr(edited, field.name) for field in fields(edited)}
     return replace(options, **{name: value for name, value in values.items() if value != getattr(filled, name)})
 
@@ -126,84 +130,78 @@ def _written_name(kind: ExportKind, prompt: ExportPrompt, scene: Scene) -> str:
         return ""
 
 
-def _device(options: ExportOptions, export: _Export) -> ExportOptions:
+def _device(options: ExportOptions, export: _Export) -> str | None:
     label("Made for", "The display. For any display, the pictures keep the photo's shape.")
     entries = {ANY_DISPLAY: (ANY_DISPLAY, "The photo's shape.")}
     for name, quilt in DEVICES.items():
         size = f"{quilt.size.width} x {quilt.size.height} pixels"
         entries[name] = (name, f"{quilt.columns} x {quilt.rows} views in a picture of {size}.")
     device = choice_row("device", options.device or ANY_DISPLAY, entries)
-    return replace(options, device=None if device == ANY_DISPLAY else device)
+    return None if device == ANY_DISPLAY else device
 
 
-def _motion(options: ExportOptions, export: _Export) -> ExportOptions:
+def _motion(options: ExportOptions, export: _Export) -> AnimationKind:
     label("Motion", "What moves. The end meets the beginning, so it can loop.")
-    entries = {name: (name.capitalize(), MOTION_TIPS[name]) for name in kinds.ANIMATIONS}
-    return replace(options, motion=choice_row("motion", options.motion, entries))
+    return choice_row(
+        "motion", options.motion, {name: (name.capitalize(), MOTION_TIPS[name]) for name in kinds.ANIMATIONS}
+    )
 
 
-def _keys(options: ExportOptions, export: _Export) -> ExportOptions:
+def _keys(options: ExportOptions, export: _Export) -> Path | None:
     label("Camera path", "A text file with a line for each place: s t, s t focus, or s t focus aperture.")
     text, _ = text_field("keys", str(options.keys or ""), "a text file, instead of the motion above")
-    return replace(options, keys=Path(text) if text.strip() else None)
+    return Path(text) if text.strip() else None
 
 
-def _eyes(options: ExportOptions, export: _Export) -> ExportOptions:
+def _eyes(options: ExportOptions, export: _Export) -> float:
     scene, (far, near) = export.scene, export.scene.disparity_range_px
     percent = 100 * max(near - far, MIN_SPAN_PX) / scene.width  # of the width, for eyes one view apart
-    shown = percent * options.eyes
     tip = "How far the nearest moves against the farthest, of the width. What is in focus lies on the screen."
-    new = slider("3D strength", shown, (0.0, percent * max(scene.grid.columns - 1, 1)), "%.1f %%", tip)
-    return options if new == shown else replace(options, eyes=new / percent)
+    limits = 0.0, max(scene.grid.columns - 1, 1)
+    return slider("3D strength", options.eyes, limits, "%.1f %%", tip, unit=1 / percent)
 
 
-def _grid(options: ExportOptions, export: _Export) -> ExportOptions:
+def _grid(options: ExportOptions, export: _Export) -> GridShape | None:
     label("Views", "Number of views a side. More make smaller steps between the same outermost views.")
     scene, grid = export.scene, options.grid or export.scene.grid
     size = f"of {scene.width} x {scene.height} pixels"
     if scene.plan is None:
         imgui.text(f"{grid.rows} x {grid.columns} {size}")
-        return options
+        return options.grid
     imgui.set_next_item_width(WIDTH_FIELD * scale())
     changed, side = imgui.input_int("##views", grid.columns, 0, 0)
     imgui.same_line()
     imgui.text(f"x {grid.rows} {size}")
     side = min(max(side, 1), kinds.MAX_SIDE_VIEWS)
-    return replace(options, grid=GridShape(side, side)) if changed else options
+    return GridShape(side, side) if changed else options.grid
 
 
-def _row(options: ExportOptions, export: _Export) -> ExportOptions:
+def _row(options: ExportOptions, export: _Export) -> int:
     limits = 0, export.scene.height - 1
-    return replace(
-        options, row=round(slider("Row", options.row, limits, "%.0f", "Row of the picture, counted from the top."))
-    )
+    return round(slider("Row", options.row, limits, "%.0f", "Row of the picture, counted from the top."))
 
 
-def _size(options: ExportOptions, export: _Export) -> ExportOptions:
+def _size(options: ExportOptions, export: _Export) -> ScreenSize:
     width = size_row(options.size)
     aspect = kinds.picture_aspect(export.kind, options.eyes, export.scene, export.optics)
-    return options if width is None else replace(options, size=kinds.size_of_width(export.kind, aspect, width))
+    return options.size if width is None else kinds.size_of_width(export.kind, aspect, width)
 
 
-def _frames(options: ExportOptions, export: _Export) -> ExportOptions:
+def _frames(options: ExportOptions, export: _Export) -> int:
     """Draw the number of pictures, or the length of an animation in seconds."""
     if export.kind.rate:
         label("Length", "Time until it begins again.")
         changed, seconds = imgui.input_float("##seconds", options.frames / options.rate, 0, 0, "%.4g s")
-        return replace(options, frames=_frames_in(seconds, options.rate)) if changed else options
+        return _frames_in(seconds, options.rate) if changed else options.frames
     label("Pictures", "Number of pictures from near to far.")
     changed, frames = imgui.input_int("##frames", options.frames, 0, 0)
-    return replace(options, frames=min(max(frames, 1), kinds.MAX_FRAMES)) if changed else options
+    return min(max(frames, 1), kinds.MAX_FRAMES) if changed else options.frames
 
 
-def _rate(options: ExportOptions, export: _Export) -> ExportOptions:
-    """Draw the frame rate. A higher rate keeps the length and raises the number of frames."""
+def _rate(options: ExportOptions, export: _Export) -> float:
     label("Frame rate", f"Frames per second; {options.frames} frames in all.")
     changed, rate = imgui.input_float("##rate", options.rate, 0, 0, "%.4g fps")
-    if not changed or not math.isfinite(rate):
-        return options
-    rate = clamp(rate, *kinds.RATE_LIMITS)
-    return replace(options, rate=rate, frames=_frames_in(options.frames / options.rate, rate))
+    return clamp(rate, *kinds.RATE_LIMITS) if changed and math.isfinite(rate) else options.rate
 
 
 def _frames_in(seconds: float, rate: float) -> int:
@@ -211,54 +209,51 @@ def _frames_in(seconds: float, rate: float) -> int:
     return round(clamp(seconds * rate if math.isfinite(seconds) else 0.0, 2, kinds.MAX_FRAMES))
 
 
-def _layout(options: ExportOptions, export: _Export) -> ExportOptions:
+def _layout(options: ExportOptions, export: _Export) -> DepthLayout:
     label("Depth", "Place of the depth beside the picture.")
-    return replace(
-        options, layout=choice_row("layout", options.layout, {n: (n.capitalize(), "") for n in kinds.DEPTH_LAYOUTS})
+    return choice_row("layout", options.layout, {name: (name.capitalize(), "") for name in kinds.DEPTH_LAYOUTS})
+
+
+def _bits(options: ExportOptions, export: _Export) -> int:
+    label("Bits", "Bits per colour channel. 16 keep fine gradients for editing.")
+    return int(choice_row("bits", str(options.bits), {str(bits): (f"{bits} bits", "") for bits in kinds.STACK_BITS}))
+
+
+def _show(options: ExportOptions, export: _Export) -> bool:
+    label("Display")
+    return checkbox(
+        "show it there when it is written", options.show, "Needs Looking Glass Bridge, the display's program."
     )
 
 
-def _bits(options: ExportOptions, export: _Export) -> ExportOptions:
-    label("Bits", "Bits per colour channel. 16 keep fine gradients for editing.")
-    entries = {str(bits): (f"{bits} bits", "") for bits in kinds.STACK_BITS}
-    return replace(options, bits=int(choice_row("bits", str(options.bits), entries)))
-
-
-def _show(options: ExportOptions, export: _Export) -> ExportOptions:
-    label("Display")
-    tip = "Needs Looking Glass Bridge, the display's program."
-    return replace(options, show=checkbox("show it there when it is written", options.show, tip))
-
-
-def _budget(options: ExportOptions, export: _Export) -> ExportOptions:
+def _budget(options: ExportOptions, export: _Export) -> int | None:
     label("Size limit", "Largest file size. Pictures lose detail or views are left out. 0 for no limit.")
     form = "%.4g MB" if options.budget else "none"
     changed, megabytes = imgui.input_float("##budget", (options.budget or 0) / 1e6, 0, 0, form)
-    return replace(options, budget=int(clamp(megabytes, 0, 1000) * 1e6) or None) if changed else options
+    return int(clamp(megabytes, 0, 1000) * 1e6) or None if changed else options.budget
 
 
-def _credit(options: ExportOptions, export: _Export) -> ExportOptions:
+def _credit(options: ExportOptions, export: _Export) -> bool:
     label("Metadata")
     tip = "As the photo's file states them. The location is left out."
-    return replace(options, credit=checkbox("title, author, copyright", options.credit, tip))
+    return checkbox("title, author, copyright", options.credit, tip)
 
 
-def _at(options: ExportOptions, export: _Export) -> ExportOptions:
+def _at(options: ExportOptions, export: _Export) -> tuple[float, float] | None:
     label("Surface", "Click a surface in the picture, or select it, before you export.")
     place = export.picked
     quiet("none was clicked yet" if place is None else f"the one at {place[0]:.0f}, {place[1]:.0f}, clicked last")
-    return replace(options, at=place)
+    return place
 
 
-def _tolerance(options: ExportOptions, export: _Export) -> ExportOptions:
+def _tolerance(options: ExportOptions, export: _Export) -> float:
     tip = "Contrast that ends the surface: higher values take in more."
-    tolerance = percent_slider("Tolerance", options.tolerance, tip, True, TOLERANCE_LIMITS, is_logarithmic=True)
-    return replace(options, tolerance=tolerance)
+    return percent_slider("Tolerance", options.tolerance, tip, True, TOLERANCE_LIMITS, is_logarithmic=True)
 
 
-def _soft(options: ExportOptions, export: _Export) -> ExportOptions:
+def _soft(options: ExportOptions, export: _Export) -> float:
     span, tip = focus_span(export.scene), "How softly the mask ends before and behind the range in focus."
-    return replace(options, soft=span * percent_slider("Soft ends", options.soft / span, tip))
+    return slider("Soft ends", options.soft, (0.0, span), "%.0f %%", tip, unit=span / 100)
 
 
 ROWS: dict[str, Row] = {

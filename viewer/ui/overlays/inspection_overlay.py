@@ -43,6 +43,21 @@ def draw_inspection(state: AppState, scene: Scene, layout: Layout, textures: Ins
         _draw_status(state, scene, scale, layout.status)
 
 
+def draw_minimap(layout: Layout, texture: int) -> None:
+    """Draw the whole picture small in a corner, a frame around the part that is seen, and the scale."""
+    at, part, draw, scale = layout.minimap, layout.part, imgui.get_background_draw_list(), layout.ui_scale
+    if at is None:
+        return
+    _image(texture, at)
+    draw.add_rect(*corners(at), pack_color(BLACK, 0.7), 0, scale)
+    x, y = at.x + part.x * at.width, at.y + part.y * at.height
+    seen = corners(Rect(x, y, part.width * at.width, part.height * at.height))
+    draw.add_rect(*seen, pack_color(BLACK, 0.6), 0, 3.5 * scale)
+    draw.add_rect(*seen, pack_color(DARK.text), 0, 1.5 * scale)
+    words, top = f"{100 * layout.scale:.0f} %", at.y - imgui.get_text_line_height() - 9 * scale
+    draw_words(words, at.x + at.width, top, scale, align=1.0)
+
+
 def status_text(state: AppState, scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
     """Return the values under the pointer, the most important first."""
     words = [f"{hover.x_px:.0f}, {hover.y_px:.0f}"]

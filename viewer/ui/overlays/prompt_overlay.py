@@ -16,8 +16,8 @@ from viewer.model.depth_models import ModelsPrompt
 from viewer.model.folder import Thumbnail
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.saving import ExportPrompt, FinishedFile, JobProgress, SavePrompt
+from viewer.model.tasks import ShowFileTask, ask
 from viewer.ui.overlays import prompt_rows as rows
-from viewer.ui.overlays.about_prompt import about_prompt
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.notice_corner import build_rows, job_rows
@@ -25,6 +25,7 @@ from viewer.ui.overlays.path_prompt import WIDTH as PATH_WIDTH
 from viewer.ui.overlays.path_prompt import path_prompt
 from viewer.ui.overlays.save_prompt import save_prompt
 from viewer.ui.widgets import button, gap, last_part, quiet, scale
+from viewer.version import program_commit, program_licence, program_pages, program_version
 
 PROMPT_WIDTH = 460.0
 PROMPT_TOP = 0.05
@@ -97,7 +98,7 @@ def _contents(prompt: Prompt, state: AppState, thumbnails: Mapping[str, Thumbnai
         case "quit":
             return _quit(state)
         case "about":
-            return about_prompt()
+            return _about()
         case "help":
             keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
             return _help([*MOUSE, *keys])
@@ -183,6 +184,22 @@ def _help(keys: list[tuple[str, str]]) -> list[Action]:
             imgui.text_wrapped(meaning.rstrip("…"))
         imgui.end_table()
     return [do(messages.show_prompt, None)] if is_closed else actions
+
+
+def _about() -> list[Action]:
+    """Draw what the program is, and a button for each page; return the actions of the pressed ones."""
+    imgui.text(f"iibr {program_version()}")
+    quiet(f"Commit {program_commit()}, licence {program_licence()}")
+    quiet("The program never looks for a newer version by itself.")
+    gap()
+    pages = program_pages()
+    return rows.button_rows(
+        [
+            ("Look for a newer version", do(ask, ShowFileTask(pages["Releases"]))),
+            ("Libraries and licences", do(ask, ShowFileTask(f"{pages['Documentation']}/licences.md"))),
+            ("Close", do(messages.show_prompt, None)),
+        ]
+    )
 
 
 def _quit(state: AppState) -> list[Action]:

@@ -11,7 +11,7 @@ from viewer.model.app_state import AppState
 from viewer.model.commands import OVERLAY_WORDS
 from viewer.model.inspection import Comparison, OverlayKind
 from viewer.model.preferences import Units
-from viewer.ui.widgets import button, checkbox, choices, edit, percent_slider
+from viewer.ui.widgets import button, checkbox, choices, edit, percent_slider, switch
 
 VIEWS = {
     "epis": (
@@ -61,8 +61,9 @@ def _overlays(state: AppState, scene: Scene) -> list[Action]:
     chosen = state.inspection.overlay
     obstacles = {kind: inspection.obstacle_to_overlay(scene, kind) for kind in OVERLAY_TIPS}
     entries = {kind: (OVERLAY_WORDS[kind].capitalize(), obstacles[kind] or tip) for kind, tip in OVERLAY_TIPS.items()}
-    pressed = choices(entries, [chosen], greyed=[kind for kind, obstacle in obstacles.items() if obstacle])
-    actions = [do(inspection.set_overlay, None if chosen == pressed else pressed)] if pressed else []
+    actions = switch(
+        inspection.set_overlay, entries, chosen, [kind for kind, obstacle in obstacles.items() if obstacle]
+    )
     opacity = percent_slider("Opacity", state.inspection.opacity, OPACITY_TIP, chosen is not None)
     return actions + edit(inspection.set_opacity, state.inspection.opacity, opacity)
 
@@ -74,6 +75,5 @@ def _comparisons(state: AppState) -> list[Action]:
         "photo": ("Photo", PHOTO_TIP),
         "snapshot": ("Snapshot", COMPARED_TIP if has_snapshot else inspection.NO_SNAPSHOT),
     }
-    pressed = choices(entries, [chosen], greyed=[] if has_snapshot else ["snapshot"])
-    actions = [do(inspection.compare, None if chosen == pressed else pressed)] if pressed else []
+    actions = switch(inspection.compare, entries, chosen, [] if has_snapshot else ["snapshot"])
     return actions + ([do(inspection.take_snapshot)] if button("Take a snapshot", SNAPSHOT_TIP) else [])

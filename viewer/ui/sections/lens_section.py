@@ -18,7 +18,7 @@ from viewer.model.app_state import AppState
 from viewer.model.tasks import ChooseTask, ask
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette, palette_of
-from viewer.ui.widgets import button, checkbox, choice, edit, in_row, percent_slider, quiet, scale, slider
+from viewer.ui.widgets import button, checkbox, choice, depth_slider, edit, in_row, percent_slider, quiet, scale, slider
 
 FOCUS_TIP = "Distance that is sharp, from near to far. You can also click in the picture or turn the wheel."
 FOCUS_DISPARITY_TIP = "Disparity that is sharp, in pixels per view step. Larger is closer."
@@ -52,22 +52,17 @@ def focus_section(state: AppState, scene: Scene) -> list[Action]:
     (right, down), is_tilted = optics.focus_tilt, state.tilt_handles is not None or any(optics.focus_tilt)
     is_in_px = state.preferences.units == "light field"
     actions = _distance(state, scene) if is_in_px else []
-    size, form = (1.0, "%.2f px") if is_in_px else (span / 100, "%.0f %%")
-
-    def difference(text: str, value: float, low: float, form: str, tip: str = "", is_enabled: bool = True) -> float:
-        """Build a slider for a difference in px per view step, which is shown in units of `size`."""
-        shown = slider(text, value / size, (low / size, span / size), form, tip, is_enabled=is_enabled)
-        return value if shown == value / size else shown * size
-
-    focus_range = difference("Range", optics.focus_range, 0.0, f"± {form}" if optics.focus_range else "none", RANGE_TIP)
+    unit, form = (1.0, "%.2f px") if is_in_px else (span / 100, "%.0f %%")
+    words = f"± {form}" if optics.focus_range else "none"
+    focus_range = slider("Range", optics.focus_range, (0.0, span), words, RANGE_TIP, unit=unit)
     actions += edit(lens.set_focus_range, optics.focus_range, focus_range)
     if checkbox("Tilt", is_tilted, TILT_TIP) != is_tilted:
         actions.append(do(lens.show_tilt_handles, not is_tilted))
         actions += [do(lens.set_focus_tilt, (0.0, 0.0))] if is_tilted else []
-    signed = form.replace("%", "%+", 1)
+    signed, limits = form.replace("%", "%+", 1), (-span, span)
     tilt = (
-        difference("Tilt right", right, -span, signed, is_enabled=is_tilted),
-        difference("Tilt down", down, -span, signed, is_enabled=is_tilted),
+        slider("Tilt right", right, limits, signed, is_enabled=is_tilted, unit=unit),
+        slider("Tilt down", down, limits, signed, is_enabled=is_tilted, unit=unit),
     )
     return actions + edit(lens.set_focus_tilt, optics.focus_tilt, tilt)
 
@@ -77,11 +72,11 @@ def focus_slider(state: AppState, scene: Scene) -> list[Action]:
     disparity = state.optics.focus_disparity
     if state.preferences.units == "light field" or not scene.has_view_disparity:  # else nothing is near or far yet
         edited = slider("Focus", disparity, focus_limits(scene), "%.2f px", FOCUS_DISPARITY_TIP)
-        return edit(lens.set_focus, disparity, edited)
-    distance, percent = units.metres(scene, disparity), units.far_percent(scene, disparity)
-    form = "%.0f %%" if distance is None else units.metres_text(distance)
-    new = slider("Focus", percent, (0.0, 100.0), f"near  ·  {form}  ·  far", FOCUS_TIP)
-    return [] if new == percent else [do(lens.set_focus, units.disparity_at_percent(scene, new))]
+    else:
+        distance = units.metres(scene, disparity)
+        form = "%.0f %%" if distance is None else units.metres_text(distance)
+        edited = depth_slider("Focus", disparity, focus_limits(scene), form, FOCUS_TIP)
+    return edit(lens.set_focus, disparity, edited)
 
 
 def _distance(state: AppState, scene: Scene) -> list[Action]:

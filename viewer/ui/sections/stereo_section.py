@@ -12,7 +12,7 @@ from viewer.model.commands import STEREO_WORDS
 from viewer.model.stereo import STEREO_MODES, Monitor
 from viewer.model.tasks import PlainTask, ask
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, checkbox, colored, combo, edit, label, slider
+from viewer.ui.widgets import button, checkbox, colored, combo, depth_slider, edit, label, slider
 
 MONITOR_TIP = "Display that shows the stereo picture, full screen."
 WINDOW, WINDOW_TIP = "This window", "The window itself shows the picture, full screen; Tab shows the panel over it."
@@ -40,14 +40,13 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     if picked is not None:
         is_pair = picked < len(STEREO_MODES)
         actions.append(do(stereo.set_mode, STEREO_MODES[picked]) if is_pair else do(ask, PlainTask("find display")))
-    eyes, plane = stereo.eye_distance(scene, shown), stereo.screen_plane(scene, shown)
-    limits = 0.0, stereo.eye_distance_limit(scene)
+    plane = stereo.screen_plane(scene, shown)
+    actions += _eyes(state, scene, wanted)
     if state.preferences.units == "light field":
-        actions += edit(stereo.set_eyes, eyes, slider("Eye distance", eyes, limits, "%.2f views", EYES_TIP))
         edited = slider("Screen plane", plane, scene.disparity_range_px, "%.2f px", SCREEN_TIP)
-        actions += edit(stereo.set_screen, plane, edited)
     else:
-        actions += _parallax(state, scene, wanted) + _plane(scene, plane)
+        edited = depth_slider("Screen plane", plane, scene.disparity_range_px, "%.0f %%", SCREEN_TIP)
+    actions += edit(stereo.set_screen, plane, edited)
     if warning := stereo.warning(scene, shown):
         colored(warning, imgui.ImVec4(*palette_of(state.preferences.theme).warning))
     swaps = checkbox("Swap the eyes", is_swapped, SWAP_TIP) != is_swapped
@@ -59,18 +58,12 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     return actions + ([do(stereo.show, not shown.is_shown)] if button(f"{word}###show stereo", SHOW_TIP) else [])
 
 
-def _parallax(state: AppState, scene: Scene, monitor: Monitor | None) -> list[Action]:
+def _eyes(state: AppState, scene: Scene, monitor: Monitor | None) -> list[Action]:
     """Build the slider of the eye distance: the largest parallax, in per cent of the width and, if known, in cm."""
     eyes, a_view = stereo.eye_distance(scene, state.stereo), stereo.parallax_of_a_view(scene, state.stereo)
-    percent, limit = 100 * a_view * eyes, 100 * a_view * stereo.eye_distance_limit(scene)
-    size = f" · {percent / 1000 * monitor.width_mm:.1f} cm" if monitor is not None and monitor.width_mm else ""
-    new = slider("Eye distance", percent, (0.0, limit), f"%.1f %% of width{size}", EYES_TIP)
-    return [do(stereo.set_eyes, new / 100 / a_view)] if new != percent else []
-
-
-def _plane(scene: Scene, plane: float) -> list[Action]:
-    """Build the slider of the plane of the screen, from near to far as the focus."""
-    far, near = scene.disparity_range_px
-    percent = 100 * (near - plane) / (near - far) if near > far else 0.0
-    new = slider("Screen plane", percent, (0.0, 100.0), "near  ·  %.0f %%  ·  far", SCREEN_TIP)
-    return [do(stereo.set_screen, near - new / 100 * (near - far))] if new != percent else []
+    width_mm = monitor.width_mm if monitor is not None else 0
+    size = f" · {a_view * eyes * width_mm / 10:.1f} cm" if width_mm else ""
+    is_in_views = state.preferences.units == "light field"
+    unit, form = (1.0, "%.2f views") if is_in_views else (0.01 / a_view, f"%.1f %% of width{size}")
+    limits = 0.0, stereo.eye_distance_limit(scene)
+    return edit(stereo.set_eyes, eyes, slider("Eye distance", eyes, limits, form, EYES_TIP, unit=unit))

@@ -42,9 +42,10 @@ def view_section(state: AppState, scene: Scene) -> list[Action]:
     actions += [do(viewpoint.set_speed, 1 / seconds)] if seconds != 1 / motion.speed else []
     if farthest := dolly_limit(scene.grid):
         is_in_views = state.preferences.units == "light field"
-        step, form = (1.0, "%+.2f views") if is_in_views else (farthest / 100, "%+.0f %%")
-        edited = slider("Dolly", dolly / step, (-farthest / step, farthest / step), form, DOLLY_TIP)
-        actions += [do(lens.set_dolly, edited * step)] if edited != dolly / step else []
+        unit, form = (1.0, "%+.2f views") if is_in_views else (farthest / 100, "%+.0f %%")
+        actions += edit(
+            lens.set_dolly, dolly, slider("Dolly", dolly, (-farthest, farthest), form, DOLLY_TIP, unit=unit)
+        )
     return actions + _head_rows(state)
 
 
