@@ -142,7 +142,7 @@ def _in_focus(name: str, xmp: Element, data: bytes, end: int) -> bytes | None:
 
 def leia_estimate(data: bytes) -> DepthEstimate | None:
     """Return the map of a Leia image's first view, white near; None without. Raises InputError if it is damaged."""
-    leia = read_lif(data, "Leia")
+    leia = read_lif(data, "Leia image")
     if leia is None:
         return None
     fields = (view.inverse_depth for view in leia.views if view.image == SOURCE_IMAGE)

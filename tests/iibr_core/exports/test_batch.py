@@ -127,16 +127,6 @@ def test_photos_are_not_overwritten_through_links(archive, tmp_path, force) -> N
     assert {name: (archive / name).read_bytes() for name in files(archive)} == before
 
 
-def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive, tmp_path) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "mine.txt").touch()
-    with pytest.raises(InputError, match="already exists"):
-        export(archive)
-    with pytest.raises(InputError, match="in the input"):
-        check_batch_folder(archive / "out", [archive], force=True)
-    assert export(archive, force=True).written == 2
-
-
 GREY = np.full((4, 6, 3), 100, np.uint8)
 
 

@@ -10,7 +10,6 @@ from iibr_core.formats.cameras import FieldCameras, write_llff, write_nerfstudio
 from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.views import grid_of
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 SIZE = ImageSize(12, 16)
@@ -94,14 +93,6 @@ def test_other_cameras_make_no_light_field(tmp_path, change) -> None:
         InputError, match=r"its 6 cameras do not look the same way from a regular grid.*give them as poses"
     ):
         open_light_field(folder)
-
-
-def test_photos_taken_by_hand_are_for_an_evaluation(tmp_path) -> None:
-    stray = OFFSETS | {"v00_u01.png": ViewOffset(-0.8, 0.3)}
-    scene = open_light_field(write_scene(tmp_path / "scene", "LLFF", stray))
-    assert (scene.layout, scene.views[0].camera is None) == ("LLFF, 6 photos", False)
-    with pytest.raises(InputError, match="only an evaluation reads them"):
-        grid_of(scene)
 
 
 def test_the_folder_with_a_picture_for_each_pose_counts(tmp_path) -> None:

@@ -8,7 +8,7 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import Arrangement
-from iibr_core.formats.light_fields.views import read_views, view_offsets
+from iibr_core.formats.light_fields.views import grid_of, read_views, view_offsets
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.scenes.light_fields import find_disparity
@@ -33,7 +33,7 @@ def write_flat(folder: Path, names: list[str]) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(3, 3), (1, 3), (3, 5)])
+@pytest.mark.parametrize(("rows", "columns"), [(4, 2), (1, 3), (3, 5)])
 def test_hci_names_count_row_by_row(tmp_path, rows, columns) -> None:
     folder = write_hci(tmp_path / "dino", rows, columns)
     write_image(folder / "objectids_highres.png", np.zeros((9, 9, 3), np.uint8))  # comes with the data set
@@ -270,3 +270,5 @@ def test_llff_counts_in_steps_between_neighbours_across_the_viewing_direction(tm
     assert scene.range_px == pytest.approx((50 * 0.5 / 40, 50 * 0.5 / 5))
     assert scene.focal_px == 50
     assert "up to 0.6 view steps before or behind" in scene.notes[0]
+    with pytest.raises(InputError, match="only an evaluation reads them"):
+        grid_of(scene)
