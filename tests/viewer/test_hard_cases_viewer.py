@@ -16,14 +16,11 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.picture_files import read_settings
 from viewer.background.newest import Failed
-from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens
-from viewer.model.action import do
 
 GRID = GridShape(3, 3)
 
@@ -83,23 +80,6 @@ def test_a_view_deleted_while_the_light_field_opens(desk, tmp_path):
     message = failure(desk, SceneRequest(2, Source(str(tmp_path / "field"))))
     assert "input_Cam008.png: this view is missing" in message
     goes_on(desk, tmp_path, 3)
-
-
-@pytest.fixture
-def viewer(tmp_path):
-    with OffscreenScene("egl") as made:
-        made.open(Source(str(write_scene(tmp_path)), grid=GRID))
-        yield made
-
-
-def test_the_photo_may_go_once_it_is_open(viewer, tmp_path):
-    before = viewer.picture()
-    (tmp_path / "scene.png").unlink()
-    (tmp_path / "scene_disparity.npy").unlink()
-    viewer.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(lens.set_aperture, 2.0))
-    assert (viewer.picture() != before).any()
-    with pytest.raises(InputError, match=r"scene\.png: no such file"):
-        viewer.open(Source(str(tmp_path / "scene.png")))
 
 
 def test_settings_that_are_no_text(tmp_path):

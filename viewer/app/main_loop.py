@@ -15,7 +15,6 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.scene_gloss import GlossRequest
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
-from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_camera_view import FreeCameraView
 from viewer.app.handover import Receiver
 from viewer.app.interruption import interruptions
@@ -222,10 +221,11 @@ class App:
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
         actions += self._preferences.advance(self.state) + self._place_window()
-        actions += actions_from_drop(self.window.take_dropped(), self.state)
+        if dropped := self.window.take_dropped():
+            actions.append(do(opening.open_paths, dropped))
         if (received := self.receiver.take()) is not None:
             self.window.ask_for_attention()
-            actions += actions_from_drop(received, self.state)
+            actions.append(do(opening.open_paths, received))
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(do(window.set_narrow, not self.state.is_narrow))
         return actions

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from iibr_core.scenes.scene import Source
-from viewer.app.dropped_files import actions_from_drop
 from viewer.app.handover import hand_over
 from viewer.cli.options import require_source
 from viewer.cli.view import open_window
-from viewer.model.app_state import AppState
+from viewer.model import opening
+from viewer.model.action import do
 
 
 def open_photos(
@@ -29,4 +29,4 @@ def open_photos(
     for name in names:
         require_source(Source(name))
     if not hand_over(names):
-        open_window(None, 1.0, *actions_from_drop(names, AppState()))
+        open_window(None, 1.0, do(opening.open_paths, names))

@@ -13,8 +13,17 @@ from pathlib import PurePath
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.picture import CUT_OFF
+from iibr_core.formats.maps.map_names import is_map_path
 from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
-from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source, source_with_depth
+from iibr_core.scenes.scene import (
+    DepthSettings,
+    Progress,
+    Scene,
+    Source,
+    source_beside,
+    source_with_depth,
+    source_with_map,
+)
 from iibr_core.types import InputError
 from viewer.model.action import Setter, setter
 from viewer.model.app_state import AppState
@@ -44,6 +53,16 @@ def open_source(state: AppState, source: Source) -> AppState:
         free_camera=None,
         prompt=None,
     )
+
+
+def open_paths(state: AppState, paths: Sequence[str]) -> AppState:
+    """Open the first photo of some paths, with a depth map among them; a map alone is for the photo that is open."""
+    maps = [path for path in paths if is_map_path(PurePath(path))]
+    others = [path for path in paths if path not in maps]
+    source = source_beside(state.source, others[0]) if others else state.source
+    if source is not None and maps:
+        return open_source(state, source_with_map(source, maps[0]))
+    return open_source(state, source or Source(maps[0])) if others or maps else state
 
 
 def stop(state: AppState) -> AppState:

@@ -104,26 +104,7 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
     assert is_far[given == NEAR].mean() > 0.7
 
 
-def test_a_section_that_is_opened_at_the_bottom_comes_into_sight(viewer):
-    sections = tuple(section for section in SECTIONS if section != "depth")
-    viewer.app.state = replace(
-        viewer.app.state, preferences=replace(viewer.app.state.preferences, open_sections=sections)
-    )
-    viewer.until_idle()
-    panel = imgui.internal.find_window_by_name("panel")
-    _, y = viewer.find("###section Depth")
-    if panel.pos.y + panel.size.y - y > 80:  # scroll up, so that the heading lies at the bottom
-        panel.scroll.y -= panel.pos.y + panel.size.y - y - 40
-        viewer.until_idle()
-        _, y = viewer.find("###section Depth")
-    before = panel.scroll.y
-    viewer.send("click", 1)
-    viewer.settle(lambda app: "depth" in app.state.preferences.open_sections)
-    assert panel.scroll.y > before
-    assert viewer.find("###section Depth")[1] < y
-
-
-def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer):
+def test_the_key_of_the_brush_and_the_heading_of_its_section_bring_it_into_sight(viewer):
     """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
     sections = tuple(section for section in SECTIONS if section != "depth")
     preferences = replace(viewer.app.state.preferences, open_sections=sections)
@@ -142,6 +123,15 @@ def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(view
     assert viewer.app.state.brush.radius > 0.1
     viewer.send("key", "b")
     viewer.until(lambda app: not app.state.brush.is_on)
+    viewer.press("###section Depth")
+    viewer.settle(lambda app: "depth" not in app.state.preferences.open_sections)
+    _, y = viewer.find("###section Depth")
+    panel.scroll.y -= max(panel.pos.y + panel.size.y - y - 40, 0)  # so that the heading lies at the bottom
+    viewer.until_idle()
+    viewer.press("###section Depth")
+    before = panel.scroll.y
+    viewer.settle(lambda app: "depth" in app.state.preferences.open_sections)
+    assert panel.scroll.y > before
 
 
 def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer):
@@ -174,13 +164,13 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer, photo_path, tmp_pat
     viewer.app.do(do(saving.ask_to_save, "map"))
     viewer.settle(lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "turned.npy"
-    viewer.type(str(out))
+    viewer.type(out.name)
     viewer.send("key", "Return")
     viewer.settle(lambda app: out.exists())
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
     viewer.do(do(messages.show_prompt, PathPrompt("map")))
-    viewer.type(str(out))
+    viewer.type(out.name)
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
     viewer.settle(is_made)

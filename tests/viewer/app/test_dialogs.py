@@ -11,27 +11,27 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.app.dialogs import ask_for_path, ask_for_place, list_folder
 from viewer.model.saving import ExportPrompt, SavePrompt
 
-PLACE = SavePrompt("photos/one-iibr.png", ScreenSize(3, 2))
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What the system's dialogs are asked to show."""
+    words = []
+    for kind in ("open_file", "select_folder", "save_file"):
+        monkeypatch.setattr(portable_file_dialogs, kind, lambda *each: words.append(each))
+    return words
 
 
 @pytest.mark.parametrize("beside", ["photos/one.jpg", "photos/", "~/photos/"])
-@pytest.mark.parametrize(("what", "kind"), [("photo", "open_file"), ("folder", "select_folder")])
-def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(monkeypatch, what, kind, beside):
+def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(asked, monkeypatch, beside):
     monkeypatch.setenv("HOME", os.getcwd())
-    asked = []
-    monkeypatch.setattr(portable_file_dialogs, kind, lambda *words: asked.append(words))
-    ask_for_path(what, beside)
-    _, start, *filters = asked[0]
-    assert start == os.path.join(os.getcwd(), "photos", "")
-    for patterns in filters:
-        assert {"*.jpg", "*.JPG", "*.HEIC", "*.hif"} <= set(patterns[1].split())
+    ask_for_path("photo", beside)
+    ask_for_path("folder", beside)
+    assert [words[1] for words in asked] == [os.path.join(os.getcwd(), "photos", "")] * 2
+    assert {"*.jpg", "*.JPG", "*.HEIC", "*.hif"} <= set(asked[0][2][1].split())
 
 
-def test_a_place_is_asked_for_with_the_typed_name(monkeypatch):
-    asked = []
-    monkeypatch.setattr(portable_file_dialogs, "save_file", lambda *words: asked.append(words))
-    monkeypatch.setattr(portable_file_dialogs, "select_folder", lambda *words: asked.append(words))
-    ask_for_place(PLACE)
+def test_a_place_is_asked_for_with_the_typed_name(asked):
+    ask_for_place(SavePrompt("photos/one-iibr.png", ScreenSize(3, 2)))
     assert ask_for_place(ExportPrompt("hci", "photos/field")).name == "field"
     assert asked[0][:2] == ("Save the picture", os.path.join(os.getcwd(), "photos", "one-iibr.png"))
     assert asked[1][1] == os.path.join(os.getcwd(), "photos")

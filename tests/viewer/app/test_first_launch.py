@@ -28,22 +28,16 @@ def test_an_empty_window_offers_to_open_a_photo_and_to_see_the_demo(open_window,
 
 
 def test_a_click_opens_a_recent_photo_and_photos_that_are_gone_are_not_shown(open_window, photo_path, tmp_path):
-    gone = str(tmp_path / "gone.png")
-    store_preferences(AppState(recent=(gone, str(photo_path))), tmp_path / "kept")
+    gone, other = str(tmp_path / "gone.png"), str(write_scene(tmp_path, "other"))
+    state = AppState(recent=(gone, str(photo_path), other), preferences=Preferences(open_sections=("more",)))
+    store_preferences(state, tmp_path / "kept")
     driver = open_window(None, kept_in=tmp_path / "kept")
-    driver.until(lambda app: app.state.existing_recent == (str(photo_path),))
+    driver.until(lambda app: app.state.existing_recent == (str(photo_path), other))
     driver.press(f"photo {photo_path}", "welcome")
     driver.until(lambda app: app.state.scene is not None)
     assert driver.app.state.scene.name == "scene"
     assert driver.app.state.preferences.opened_folder == str(photo_path.parent)
-    assert driver.app.state.recent == (str(photo_path), gone), "its disk may be back the next time"
-
-
-def test_recent_photos_stay_at_hand_while_one_is_open(open_window, photo_path, tmp_path):
-    other = write_scene(tmp_path, "other")
-    kept = Preferences(open_sections=("more",))
-    store_preferences(AppState(recent=(str(other),), preferences=kept), tmp_path / "kept")
-    driver = open_window(photo_path, kept_in=tmp_path / "kept")
+    assert driver.app.state.recent == (str(photo_path), gone, other), "its disk may be back the next time"
     driver.until_idle()
     driver.press(f"other.png##{other}")
     driver.until(lambda app: app.state.scene.name == "other")

@@ -7,6 +7,7 @@ import pytest
 
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ViewOffset
 from viewer.app import saving
 from viewer.model import lens
 from viewer.model.action import do
@@ -37,7 +38,9 @@ def test_the_camera_steps_forward_looks_aside_and_goes_back(viewer):
     before = viewer.image()
     viewer.send("key", "w", "key", "w")
     viewer.until(lambda app: app.state.free_camera == FreeCamera(forward=0.1))
+    near = viewer.app.scene_view.pick(ViewOffset(0, 0), 48, 32)
     assert np.ptp(red_places(seen(viewer))[:, 0]) == pytest.approx(1 / 3 / 0.9, abs=0.02)
+    assert near < viewer.app.scene_view.pick(ViewOffset(0, 0), 48, 32) < near + 1, "it is nearer, for the lens too"
     viewer.send("key", "s", "key", "s", "key", "shift+d", "key", "shift+d")
     viewer.until(lambda app: app.state.free_camera == FreeCamera(right=0.1))
     assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.45, abs=0.02)

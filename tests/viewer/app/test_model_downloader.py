@@ -14,7 +14,7 @@ from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import local_hub
-from viewer.background.depth_models import OFFLINE, list_models
+from viewer.background.depth_models import OFFLINE
 from viewer.model import depth, depth_models, gesture, history, lens, opening, preferences
 from viewer.model.action import do
 from viewer.model.depth import Brush
@@ -278,9 +278,3 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     assert depth_kind(second.app) == "rough"
     now = second.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
     assert sharp_disparity(second.app.state.optics, at) == pytest.approx(now, abs=0.02)
-
-
-def test_a_missing_package_completes_the_sentence_about_a_model(monkeypatch):
-    """The window writes "It ..." before it."""
-    monkeypatch.setattr("iibr_core.depth.models.known.is_installed", lambda name: False)
-    assert all(offer.lacks.startswith("needs the package ") for offer in list_models())

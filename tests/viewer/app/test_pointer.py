@@ -5,22 +5,15 @@ from dataclasses import replace
 import pytest
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.scenes.rect import Rect as R
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.app.pointer import (
-    DRAG_ACROSS_GRID,
-    Pointer,
-    actions_from_hover,
-    actions_from_pointer,
-    units_per_view,
-)
+from viewer.app.pointer import DRAG_ACROSS_GRID, Pointer, actions_from_hover, actions_from_pointer
 from viewer.model import inspection, lens, viewpoint
 from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.focal_plane import handle_points
 from viewer.model.inspection import Hover
-from viewer.model.layout import Zoom, layout_of, pixel_at
+from viewer.model.layout import Zoom, layout_of
 from viewer.model.lens import TiltHandles
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
@@ -49,17 +42,14 @@ def test_near_things_follow_the_hand(step_x, step_y):
         assert (moved == 0) == (hand == 0)
 
 
-def test_the_nearest_surface_sticks_to_the_pointer_where_parallax_is_large():
-    scene = replace(SCENE, disparity_range_px=(0.0, 200.0))
-    state = replace(STATE, scene=scene)
-    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=10), state)
-    on_screen = PICTURE.width / scene.width  # window units per picture pixel
-    assert move.verb is lens.move_eye
-    assert -200 * move.args[0].s * on_screen == pytest.approx(10)
-
-
-def test_a_drag_over_part_of_the_picture_crosses_the_grid():
-    assert units_per_view(LAYOUT, SCENE) * (SCENE.grid.columns - 1) == pytest.approx(DRAG_ACROSS_GRID * PICTURE.width)
+@pytest.mark.parametrize("nearest", [0.5, 200.0])
+def test_the_nearest_surface_sticks_to_the_pointer_unless_the_grid_is_crossed_too_fast(nearest):
+    scene = replace(SCENE, disparity_range_px=(0.0, nearest))
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=10), replace(STATE, scene=scene))
+    sticks = 10 * scene.width / PICTURE.width / nearest
+    crosses = 10 * (scene.grid.columns - 1) / (DRAG_ACROSS_GRID * PICTURE.width)
+    assert -move.args[0].s == pytest.approx(min(sticks, crosses))
+    assert asked(replace(OVER_PICTURE, is_released=True, clicks=1), AppState()) == []
 
 
 def test_what_moved_before_it_was_a_drag_and_in_the_frame_of_the_release_counts():
@@ -90,13 +80,6 @@ def test_what_moved_before_it_was_a_drag_and_in_the_frame_of_the_release_counts(
 )
 def test_what_does_nothing_or_resets(pointer, expected):
     assert asked(pointer) == expected
-
-
-def test_nothing_is_asked_for_without_a_scene_or_room():
-    pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
-    assert asked(pointer, AppState()) == []
-    assert layout_of((0, 0), (4, 3)).frame_px is None
-    assert asked(pointer, layout=layout_of((200, 100), (600, 400))) == []
 
 
 WITH_HANDLES = replace(STATE, tilt_handles=TiltHandles())
@@ -137,25 +120,6 @@ def test_the_pointer_says_once_where_it_is_and_once_that_it_left():
         assert hovered(pointer) == []
 
 
-@pytest.mark.parametrize("window", [(1280, 800), (500, 900), (2000, 400)])
-@pytest.mark.parametrize("size", [(600, 400), (1, 1), (37, 1000)])
-def test_the_picture_keeps_its_shape_and_stays_beside_the_panel(window, size):
-    layout = layout_of(window, size)
-    picture = layout.picture
-    assert picture.width / picture.height == pytest.approx(size[0] / size[1])
-    assert picture.x >= 0
-    assert picture.y >= 0
-    assert picture.x + picture.width <= layout.panel.x
-    assert picture.y + picture.height <= window[1]
-    assert layout.panel.x + layout.panel.width == window[0]
-
-
-def test_picture_corners_are_half_a_pixel_outside_the_first_and_last_pixel():
-    rect = R(10, 20, 300, 200)
-    assert pixel_at(rect, (600, 400), 10, 20) == (-0.5, -0.5)
-    assert pixel_at(rect, (600, 400), 310, 220) == (599.5, 399.5)
-
-
 ZOOMED = layout_of((1280, 800), (600, 400), zoom=Zoom(4.0), own_width=600)
 
 
@@ -166,6 +130,5 @@ def test_a_press_on_the_small_picture_moves_the_large_one_and_points_at_nothing(
     for held in (replace(pointer, is_down=True), replace(pointer, is_released=True, clicks=2)):
         (action,) = asked(held, layout=ZOOMED)
         assert action.verb is viewpoint.set_zoom
-        assert action.args[0] is not None
         assert action.args[0].centre == pytest.approx((0.8, 0.3))
     assert actions_from_hover(pointer, ZOOMED, STATE, lambda x, y: 1.5) == []

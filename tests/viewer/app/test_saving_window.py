@@ -124,7 +124,8 @@ def test_a_bare_name_goes_to_the_folder_that_the_field_showed_and_stays_in_the_l
     """Also after an error, for which the field keeps the cursor."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    viewer.do(do(saving.ask_to_save))
+    viewer.send("key", "ctrl+s")
+    viewer.settle(lambda app: isinstance(app.state.prompt, SavePrompt))
     for name in (" small.xyz", " small.png"):
         viewer.type(name)
         viewer.send("key", "Return")
@@ -132,6 +133,7 @@ def test_a_bare_name_goes_to_the_folder_that_the_field_showed_and_stays_in_the_l
     viewer.until(lambda app: bool(app.state.files))
     saved = photo_path.with_name("small.png")
     assert viewer.app.state.files[0].path == str(saved)
+    assert read_settings(saved).optics == viewer.app.state.optics
     assert texts(viewer) == [f"Saved {saved}"]
     viewer.app.do(do(messages.dismiss))
     viewer.press("###files")

@@ -28,7 +28,6 @@ from viewer.model import lens, messages, preferences, stereo
 from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.stereo import STEREO_MODES, Monitor
-from viewer.model.tasks import PlainTask, ask
 
 FIRST, SECOND = ScreenSize(1024, 768), ScreenSize(640, 480)
 CALIBRATION = {"pitch": 50, "slope": -7, "center": 0.2, "DPI": 300, "screenW": SECOND.width, "screenH": SECOND.height}
@@ -223,12 +222,3 @@ def test_a_lenticular_display_that_bridge_knows_gets_its_picture(viewer, display
         wanted = scene.picture(SECOND)
     assert psnr(shown, wanted) >= 45
     assert (np.abs(shown[..., 1].astype(int) - shown[..., 2]) > 30).any(), "views differ within a pixel of a grey photo"
-
-
-def test_without_bridge_a_notice_says_so(viewer, monkeypatch):
-    with fake_bridge(monkeypatch) as bridge:
-        bridge.displays = []
-        viewer.app.do(do(ask, PlainTask("find display")))
-        viewer.until(lambda app: bool(app.state.notices))
-    assert "Looking Glass Bridge sees no display" in viewer.app.state.notices[-1].text
-    assert not viewer.app.state.stereo.is_shown

@@ -115,7 +115,7 @@ def is_menu_open():
 
 def test_a_wrong_ending_keeps_what_was_typed_and_a_problem_moves_neither_the_prompt_nor_its_buttons(viewer, tmp_path):
     viewer.do(do(saving.ask_to_save))
-    viewer.type(str(tmp_path / "a.jqg"))
+    viewer.type("a.jqg")
     viewer.send("key", "Return")
     viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and bool(app.state.prompt.problem))
     prompt = viewer.app.state.prompt
@@ -163,7 +163,7 @@ def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer, tmp_path):
     write_image(tmp_path / "inner" / "other.png", np.full((64, 96, 3), 100, np.uint8))
     viewer.app.do(BY_NAME["Open a photo…"].action(viewer.app.state))
     viewer.settle(lambda app: typed_path(app) == f"{tmp_path}/")
-    viewer.type(str(tmp_path / "inner" / "othr.png"))
+    viewer.type("inner/othr.png")
     viewer.send("key", "Return")
     viewer.settle(lambda app: isinstance(app.state.prompt, PathPrompt) and bool(app.state.prompt.problem))
     before = viewer.app.state
@@ -172,7 +172,7 @@ def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer, tmp_path):
     assert viewer.app.state.preferences == before.preferences, "letters are no commands now"
     assert viewer.app.state.inspection == before.inspection
     viewer.press("##path", "prompt PathPrompt")
-    viewer.type(str(tmp_path / "inner" / "other.png"))
+    viewer.type("inner/other.png")
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
     assert viewer.app.state.prompt is None

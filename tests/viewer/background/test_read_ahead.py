@@ -65,9 +65,10 @@ def shelf():
 
 
 def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_more(shelf):
-    shelf.want_until_done(B, A)
-    shelf.want_until_done(A, B, C)
-    assert shelf.begun == ["b", "a", "c"]
+    shelf.want_until_done(B, BAD, A)
+    shelf.want_until_done(A, B, C, BAD)
+    assert shelf.begun == ["b", "bad", "a", "c"]
+    assert shelf.ahead.get(BAD) is None
     assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == ["a 1", "b 1", "c 1"]
     shelf.ahead.want([C])
     assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == [None, None, "c 1"]
@@ -75,13 +76,6 @@ def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_mo
     shelf.ahead.keep(A, "read elsewhere")
     shelf.ahead.want([C, A])
     assert shelf.ahead.get(A) == "read elsewhere"
-
-
-def test_what_cannot_be_read_is_done_and_not_tried_again(shelf):
-    shelf.want_until_done(BAD, A)
-    shelf.want_until_done(A, BAD)
-    assert shelf.ahead.get(BAD) is None
-    assert shelf.begun == ["bad", "a"]
 
 
 @pytest.mark.parametrize("wanted", [(B, A), (B,)], ids=["first", "alone"])

@@ -9,12 +9,11 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
-from iibr_core.method import ray_transformer
 from iibr_core.runtime import compiling
 from iibr_core.scenes.f_numbers import equivalent_f_number
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import GridShape, ViewOffset, ViewUpdate
+from iibr_core.types import ViewOffset, ViewUpdate
 from tests.iibr_core.scenes.test_light_fields import write_two_planes
 from tests.viewer.conftest import reduce
 from viewer.background.newest import Failed, Newest
@@ -51,17 +50,6 @@ def desk():
     made.thread.close()
 
 
-def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(desk, photo_path):
-    desk.thread.submit(SceneRequest(7, Source(str(photo_path), grid=GridShape(3, 3))))
-    ready = desk.next()
-    assert (ready.generation, ready.scene.grid, ready.scene.name) == (7, (3, 3), "scene")
-    np.testing.assert_array_equal(ready.centre.colors, np.round(ready.loaded.photo.pixels * 255))
-    views = [desk.next() for _ in range(9)]
-    indices = {(v.view.row, v.view.column) for v in views if isinstance(v, ViewReady)}
-    assert indices == {(row, column) for row in range(3) for column in range(3)}
-    assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
-
-
 def test_a_folder_of_photos_names_its_first(desk, photo_path):
     desk.thread.submit(SceneRequest(1, Source(str(photo_path.parent))))
     assert desk.next() == PhotosFound(1, str(photo_path))
@@ -87,16 +75,6 @@ def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path):
         stops.append(equivalent_f_number(ready.scene, state.optics.aperture_diameter))
     assert ready.scene.found_span_px < 0.5 * np.ptp(ready.scene.disparity_range_px)
     assert stops == pytest.approx([stops[0]] * 3)
-
-
-def test_missing_weights_are_a_failure(desk, monkeypatch, photo_path, tmp_path):
-    monkeypatch.setattr(ray_transformer, "resource_folder", lambda name: tmp_path / name)
-    ray_transformer.shipped_transformer.cache_clear()
-    desk.thread.submit(SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))))
-    assert [type(desk.next()) for _ in range(2)] == [SceneReady, ViewReady]
-    failure = desk.next()
-    weights = tmp_path / "assets" / "weights" / "ray_transformer.safetensors"
-    assert failure.message.startswith(f"{weights}: no such file")
 
 
 def test_compiling_is_reported_beside_the_count_of_the_views(desk, monkeypatch):

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.formats.cameras import FieldCameras, write_nerfstudio
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.poses import read_poses
-from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, offsets_of, view_of_wall
 from tests.viewer.cli.conftest import output_of, refusal_of
 
@@ -60,24 +58,6 @@ def test_views_that_converge_are_cropped_around_their_principal_points(iibr, fol
     assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.08), "it opens again as a light field"
 
 
-def test_rows_closer_than_columns_stay_so(iibr, folder):
-    """A folder with cameras, exported again: rows 0.4 times as far apart."""
-    (folder / "in" / "images").mkdir(parents=True)
-    offsets = {f"{9 - k}.png": ViewOffset(0.4 * t, s) for k, (t, s) in enumerate(offsets_of(3, 3).values())}
-    for name, offset in offsets.items():
-        write_image(folder / "in" / "images" / name, view_of_wall(offset, 1.6))
-    grid = GridShape(3, 3)
-    write_nerfstudio(folder / "in", FieldCameras(grid, ImageSize(HEIGHT, WIDTH), 50.0, (1.0, 1.6), 0.0), offsets)
-    output_of(iibr("export", "in", "--to", "colmap", "-o", "out"))
-    cameras = read_poses(Path("out"))
-    places = np.array([camera.position - cameras[4].position for camera in cameras])
-    step = places[5, 0]
-    np.testing.assert_allclose(places[:, 0], step * np.tile([-1, 0, 1], 3), atol=1e-9)
-    np.testing.assert_allclose(places[:, 1], 0.4 * step * np.repeat([-1, 0, 1], 3), atol=1e-9)
-    assert {camera.focal_px for camera in cameras} == {(50.0, 50.0)}
-    assert {camera.centre_px for camera in cameras} == {(23.5, 19.5)}
-
-
 def test_principal_points_that_move_far_are_stated_or_refused(iibr, folder):
     (folder / "wall").mkdir()
     write_wall(folder / "wall", -8.4)
@@ -88,17 +68,6 @@ def test_principal_points_that_move_far_are_stated_or_refused(iibr, folder):
     assert {camera.centre_px for camera in read_poses(Path("out"))} == {
         (23.5 + 10 * s, 19.5 + 10 * t) for t in (-1, 0, 1) for s in (-1, 0, 1)
     }
-
-
-def test_an_hci_folder_of_views_without_disparity_states_its_range(iibr, folder):
-    (folder / "wall").mkdir()
-    (write_wall(folder / "wall", -1.4) / "gt_disp_u01_v01.npy").unlink()
-    output_of(iibr("export", "wall", "--to", "hci", "-o", "out"))
-    scene = open_light_field(Path("out"))
-    low, high = scene.range_px
-    assert low == pytest.approx(-1.4, abs=0.3)
-    assert low < high < 0.6
-    assert scene.infinity_px < low
 
 
 def test_a_densified_field_states_the_same_distances(iibr, folder):

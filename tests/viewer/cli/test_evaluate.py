@@ -3,11 +3,10 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_grid, write_hci
-from tests.viewer.cli.conftest import contents, output_of, refusal_of
+from tests.iibr_core.known_scenes import write_grid, write_hci
+from tests.viewer.cli.conftest import output_of, refusal_of
 
 REPORT = ["index.html", "report.json", "report.md"]
 
@@ -48,37 +47,3 @@ def test_a_report_is_replaced_with_force_only(iibr, data):
     assert "already exists; give --force" in refusal_of(iibr(*words))
     output_of(iibr(*words, "--force"))
     assert sorted(path.name for path in Path("report").iterdir()) == sorted([*REPORT, "notes.txt"])
-
-
-def test_a_map_is_compared_at_two_scales(iibr, data):
-    np.save("flat.npy", np.zeros((HEIGHT, WIDTH), np.float32))
-    out = output_of(iibr("evaluate", data / "row", "-o", "report", "--disparity", "flat.npy"))
-    figures = {name: float(db) for db, name in re.findall(r"([\d.]+) dB  (.+)", out)}
-    # flat disparity shows the photo everywhere
-    assert figures["iibr, given map"] == figures["plain warp, given map"] == figures["unchanged photo"]
-    assert figures["plain warp, given map, fitted"] == figures["one plane"] > figures["unchanged photo"]
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("gone -o o", "gone"),
-        ("empty -o o", "empty"),
-        ("data -o file", "file"),
-        ("data -o o --disparity guess", "--disparity guess: no such file"),
-        ("data -o o --disparity file", "file"),
-        ("data -o o --views 0", "--views"),
-        ("data -o o --without gaps", "outpainting"),
-        ("data -o o --lpips empty", "alexnet"),
-        ("broken -o o", "v00_u01.png"),
-        ("-o o", "DATASET"),
-    ],
-)
-def test_bad_input_is_one_line_and_leaves_nothing(iibr, data, words, message):
-    Path("empty").mkdir()
-    Path("file").write_text("no map")
-    (write_grid(Path("broken")) / "gt_disp_u01_v01.npy").unlink()
-    Path("broken/views/v00_u01.png").write_bytes(b"\x89PNG\r\n\x1a\n")
-    before = contents(Path())
-    assert message in refusal_of(iibr("evaluate", *words.split()))
-    assert contents(Path()) == before

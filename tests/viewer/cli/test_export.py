@@ -110,9 +110,7 @@ def test_the_name_with_its_tag_must_not_exist(iibr, photo):
 
 
 def test_a_light_field_of_disparity_as_given(iibr, photo):
-    words = ("export", photo, "--to", "hci", "-o", "field", "--literal")
-    assert "--grid" in refusal_of(iibr(*words))
-    done = iibr(*words, "--grid", 5)
+    done = iibr("export", photo, "--to", "hci", "-o", "field", "--literal", "--grid", 5)
     assert output_of(done) == "field\n"
     assert "In the window it is 4%" in done.stderr
     assert len(views_of("field")) == 25

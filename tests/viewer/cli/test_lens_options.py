@@ -95,10 +95,3 @@ def test_places_and_f_numbers_of_other_inputs(iibr, folder, name):
         shot, refocused = pictures(iibr, path, (*words, "--focus-at", f"{x},{y}"), options | {"at": (x, y)})
         scale = max(float(shot.max()), 1.0)
         assert iibr_core.compare(shot / scale, refocused / scale).psnr_db > 40
-
-
-def test_the_demo_refocused(iibr, tmp_path):
-    output = tmp_path / "shot.png"
-    output_of(iibr("screenshot", DEMO, "--grid", 3, "-o", output, "--f-number", 8, "--focus-at", "370,300"))
-    picture = iibr_core.open(DEMO).light_field(3).refocus(at=(370, 300), f_number=8, cameras=64)
-    assert iibr_core.compare(picture, read_photo(output).pixels).psnr_db > 40

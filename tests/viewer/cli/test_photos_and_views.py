@@ -103,22 +103,6 @@ def test_python_and_commands_give_the_same_numbers(iibr, photo_path, folder, kin
     assert (between - far) / (near - far) == pytest.approx(0.5, abs=0.03)
 
 
-@pytest.mark.parametrize("is_metric", [False, True])
-def test_a_models_depth_is_the_same_in_python(iibr, photo_path, folder, is_metric):
-    """The model gives the redness of a pixel: nearness, or a distance."""
-    red = np.full((64, 96, 3), 60, np.uint8)
-    red[SQUARE] = (220, 60, 60)
-    Image.fromarray(red).save(photo_path)
-    model = of_channels(Path("red.onnx"), as_bytes=True)
-    if is_metric:
-        Path("config.json").write_text('{"depth_estimation_type": "metric"}')
-    inverse = iibr_core.estimate_depth(photo_path, model)
-    output_of(iibr("depth", photo_path, "--depth-model", model, "--refine", "off", "-o", "map.npy"))
-    assert np.corrcoef(inverse.ravel(), np.load("map.npy").ravel())[0, 1] > 0.999
-    square, wall = (np.median(inverse[part]) for part in (SQUARE, BACK))
-    assert square / wall == pytest.approx(60 / 220 if is_metric else 220 / 60, rel=0.05)
-
-
 def pixels_of(path):
     return read_photo(path, 10**9).pixels
 

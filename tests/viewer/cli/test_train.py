@@ -50,26 +50,6 @@ def test_ctrl_c_saves_and_names_the_command_that_continues(iibr, monkeypatch):
     assert [row.split(",")[0] for row in Path("w.csv").read_text().splitlines()] == ["step", "1", "2", "3"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--steps 0", "--steps"),
-        ("--steps x", "--steps"),
-        ("--seed -1", "--seed"),
-        ("--learning-rate 0", "--learning-rate"),
-        ("--learning-rate 1e39", "--learning-rate"),
-        ("--checkpoint-every 0", "--checkpoint-every"),
-        ("--device abacus", "abacus"),
-        ("-o w.pt", "w.pt"),
-        ("-o nowhere/w.safetensors", "nowhere"),
-        ("--resume", "w.checkpoint.pt"),
-    ],
-)
-def test_bad_values_are_one_line_and_leave_nothing(iibr, words, message):
-    assert message in refusal_of(iibr("train", "--steps", 2, "-o", "w.safetensors", *words.split()))
-    assert names() == []
-
-
 @pytest.mark.parametrize("name", WRITTEN[1:])
 def test_existing_files_are_kept_without_force(iibr, name):
     """The log too, which may be somebody's table."""

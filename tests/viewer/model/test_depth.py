@@ -21,7 +21,6 @@ from iibr_core.training.degradation import blur
 from iibr_core.types import GridShape
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
-from viewer.app.dropped_files import actions_from_drop
 from viewer.app.pointer import Pointer, actions_from_pointer
 from viewer.model import depth, gesture, history, inspection, lens, opening, saving, selection
 from viewer.model.action import do
@@ -114,7 +113,7 @@ def test_a_map_is_for_the_photo_that_is_open_and_another_photo_keeps_the_choice_
     a_map = do(opening.open_source, replace(source, depth=given, focus_disparity=None))
     for kind, path, action in (("photo", "b.png", photo), ("map", "b.pfm", a_map)):
         assert action_for_path(kind, path, opened(source)) == action
-        assert actions_from_drop([path], opened(source)) == [action]
+        assert opening.open_paths(opened(source), [path]) == reduce(opened(source), action)
 
 
 def test_the_brush_paints_on_the_surface_seen_under_it():

@@ -5,9 +5,7 @@ import pytest
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape
-from viewer.app.dropped_files import actions_from_drop
 from viewer.model import opening
-from viewer.model.action import do
 from viewer.model.app_state import AppState
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
@@ -26,6 +24,5 @@ STATE = AppState(source=SCENE.source, scene=SCENE)
     ],
 )
 def test_dropped_files(paths, opened, disparity):
-    (action,) = actions_from_drop(paths, STATE)
     choice = DepthChoice(file=disparity, stretches=disparity is not None)
-    assert action == do(opening.open_source, Source(opened, choice, max_pixels=7))
+    assert opening.open_paths(STATE, paths).source == Source(opened, choice, max_pixels=7)
