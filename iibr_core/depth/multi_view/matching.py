@@ -83,17 +83,18 @@ def matching_views(
     if len(set(offsets)) < 2:
         raise InputError("all views have the same viewpoint, so no depth can be found")
     chosen = choose_views(offsets, reference)
-
-    def texture(index: int) -> FloatImage:
-        luma = luma_of(views[index], shrink)
-        smooth = luma.copy()
-        GuidedFilter(luma, TEXTURE_RADIUS_PX, TEXTURE_SMOOTHNESS).apply(smooth[None])
-        return luma - np.float32(1 - LUMA_SHARE) * smooth
-
-    textures = np.stack(in_pieces(texture, chosen, tiling.THREADS))
+    textures = np.stack(in_pieces(lambda index: texture_of(views[index], shrink), chosen, tiling.THREADS))
     relative = np.array([offsets[index] for index in chosen], np.float32) - np.array(offsets[reference], np.float32)
     colors = colors_of(views[reference], shrink)
     return MatchingViews(textures, relative, view_groups(relative), luma_of(views[reference], shrink), colors)
+
+
+def texture_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
+    """Return what is matched of a view (H, W, 3): its texture and a little of its luma, `shrink` times smaller."""
+    luma = luma_of(colors, shrink)
+    smooth = luma.copy()
+    GuidedFilter(luma, TEXTURE_RADIUS_PX, TEXTURE_SMOOTHNESS).apply(smooth[None])
+    return luma - np.float32(1 - LUMA_SHARE) * smooth
 
 
 def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
@@ -160,7 +161,7 @@ def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.
 
     def sweep_one(index: int) -> None:
         parts = np.empty((len(views.groups), *views.luma.shape), np.float32)
-        _match(views.textures, views.offsets, views.groups, disparities[index], parts)
+        match_at(views.textures, views.offsets, views.groups, disparities[index], parts)
         window.apply(parts)
         _store_costs(parts, costs[:, :, index])
         with reporting:
@@ -171,7 +172,7 @@ def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.
 
 
 @kernel
-def _match(textures, offsets, groups, disparity, parts):
+def match_at(textures, offsets, groups, disparity, parts):
     """Fill parts with mean square differences at one disparity to the views of each group; the last one is of all.
 
     All pixels of a row shift alike, so that one instruction compares several of them.

@@ -1,8 +1,8 @@
 """The order of a light field's views, tested by their parallax: names of files are often wrong.
 
-A few views are measured (`viewpoints.py`). Every order that names admit gives them places on a grid; in the right
-order, their viewpoints lie on a grid along the axes of the picture. It also shows which way rows and columns are
-counted, and how far apart rows are, but for a common sign: see `near_side.py`.
+Every order that names admit gives views places on a grid. In the right one, and with the right distance of rows, a
+plane sweep over a few small views matches best. That also shows which way rows and columns are counted, but for a
+common sign: see `near_side.py`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.multi_view.matching import luma_of
-from iibr_core.depth.multi_view.viewpoints import LONGEST_PX, SEARCH_SHARE, Viewpoints, measure_viewpoints
-from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView
+from iibr_core.depth.multi_view.matching import STEP_PX, match_at, texture_of
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import (
     UNKNOWN,
     Arrangement,
@@ -27,41 +26,58 @@ from iibr_core.formats.light_fields.order import (
     possible_arrangements,
 )
 from iibr_core.remedies import FixableError, Remedy
-from iibr_core.types import StoredColors, image_size
+from iibr_core.runtime import tiling
+from iibr_core.runtime.tiling import in_pieces
+from iibr_core.types import FloatImage, StoredColors, image_size
 
-MAX_MEASURED = 16
-"""Largest number of views that are measured."""
-MAX_STRAY, MAX_STRAY_ON_LINE = 0.5, 1.5
-"""Largest distance of a measured viewpoint from its place, in steps, on a grid and in a single row or column. A
-camera on a rail is moved by uneven steps; views of a Lytro camera lie closer together at the edge of its lens.
+SMALL_PX = 96
+"""Longer side of the small views that are matched, about."""
+MAX_MATCHED = 16
+"""Largest number of views that are matched with the reference."""
+MAX_SHIFT_SHARE = 0.25
+"""Largest shift of the farthest view that is tried, as a share of the longer side."""
+ROW_STEPS, ROW_STEP_CHANGES = (0.4, 2.5), (1.4, 1.2, 1.1, 1.05, 1.02)
+"""Distances between rows, in distances between columns, that are tried beside 1, and factors to the best one."""
+LIKELY_ORDERS = 4
+"""Number of orders, with rows counted either way, with which they are tried: the best ones."""
+EVEN_FACTOR = 1.1
+"""Factor by which views must match better with another distance between rows than with that of columns."""
+MIN_DIFFERENCE = 0.001
+"""Difference of texture (1 = white) by which a pixel must match better in one order than in another to have a vote."""
+MIN_VOTING, MIN_AGREEING = 0.005, 0.8
+"""Smallest share of all pixels that must have a vote, and of these, of those that vote for the best order."""
+MAX_DIFFERENCE_SHARE = 0.3
+"""Largest difference, as a share of that over all disparities, of views that match in some order, as repeated ones do.
 """
-MAX_STRAY_SHARE = 0.125
-"""Largest such distance on a short line, as a share of its half."""
-MIN_FITTING = 0.8
-"""Smallest share of the measured views that must lie at their places; the others may be mistaken."""
-ROUNDS = 3
-MAX_SKEW = 0.2
-"""Largest tangent of the angle between the axes of a grid and those of the picture."""
-MIN_MEASURED = 4
-"""Fewest measured views that decide between orders, unless there are fewer."""
-EQUAL_STEPS, EQUAL_STATED_STEPS = 0.06, 0.25
-"""Largest difference of the distances between rows and between columns that may be an error of measuring, of any names
-and of a layout whose rows usually stand as far apart as columns.
-"""
+EQUAL_STEPS = 0.06
+"""Largest difference of the distances between rows and between columns that may be an error of measuring."""
 Verdict = Literal["clear", "silent", "contrary"]
 """Result of the test of the order of views by parallax: one order fits, nothing is known, or none fits."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
-    """An arrangement that fits. steps: of a row down and of a column to the right, up to a common factor; 0 where the
-    grid has one row or column only. stray: distance of views from their places, in steps. measured: number of views.
+    """An arrangement and how views match in it.
+
+    places: (N, 2), row and column of the matched views from the reference. row_step: distance between rows, negative if
+    they are counted against the columns. least, mean: difference of texture (H, W) at the best disparity, and over all.
     """
 
     arrangement: Arrangement
-    steps: tuple[float, float]
-    stray: float
-    measured: int
+    places: NDArray[np.float64]
+    row_step: float
+    least: FloatImage
+    mean: FloatImage
+
+    @property
+    def has_both_axes(self) -> bool:
+        """Return whether the views do not lie in one row or column."""
+        return bool(self.places.any(axis=0).all())
+
+    def is_mirrored_by(self, other: Fit) -> bool:
+        """Return whether another fit has the same order, or the opposite one, which parallax does not tell apart."""
+        signed, others = (fit.places * (np.sign(fit.row_step), 1) for fit in (self, other))
+        return np.array_equal(signed, others) or np.array_equal(signed, -others)
 
 
 def find_order(
@@ -74,114 +90,105 @@ def find_order(
     nor the layout states one.
     """
     possible, numbers = possible_arrangements(scene, given), numbers_of(scene)
-    places = [places_in(numbers, arrangement) for arrangement in possible]
+    if not possible:
+        return None, "silent"
+    places = np.array([places_in(numbers, arrangement) for arrangement in possible], float)
     reference = scene.centre
-    chosen = _views_to_measure(places, reference)
+    chosen = _views_to_match(places, reference)
     if not chosen:
         return None, "silent"
-    found = _measure([views[k] for k in (reference, *chosen)])
-    fits = [
-        fit
-        for arrangement, at in zip(possible, places)
-        if (fit := _fit(arrangement, np.array([at[k] for k in chosen], float) - at[reference], found)) is not None
-    ]
-    if fits:
-        fit = _with_flip(min(fits, key=lambda fit: round(fit.stray, 1)), scene, given)
-        is_told = scene.is_stated and given == UNKNOWN
-        return (None, "silent") if is_told and fit.measured < len(chosen) / 2 else (fit, "clear")
-    if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)):
-        return None, "silent"
-    if scene.is_stated or given.order is not None:
-        return None, "contrary"
+    shrink = max(round(max(image_size(views[0])) / SMALL_PX), 1)
+    textures = np.stack([texture_of(views[k], shrink) for k in (reference, *chosen)])
+    brightness = textures.mean(axis=(1, 2), keepdims=True) + np.float32(1e-6)
+    textures *= brightness[0] / brightness  # exposures may differ
+    relative = places[:, chosen] - places[:, [reference]]
+    fit, verdict = _best_fit(textures, dict(zip(possible, relative)))
+    if fit is not None:
+        return _with_flip(fit, given), verdict
+    if verdict == "silent" or scene.is_stated or given.order is not None:
+        return None, verdict
     if scene.is_guess:
-        raise FixableError(
-            f"{scene.place}: holds no light field, or in an unusual order: the parallax of its {len(views)} numbered"
-            " pictures fits none",
-            Remedy.VIEW_ORDER,
-        )
-    raise FixableError(
-        f"{scene.place}: the parallax of its views fits no order that their names suggest", Remedy.VIEW_ORDER
-    )
+        problem = "holds no light field, or in an unusual order: the parallax of its numbered pictures fits none"
+    else:
+        problem = "the parallax of its views fits no order that their names suggest"
+    raise FixableError(f"{scene.place}: {problem}", Remedy.VIEW_ORDER)
 
 
-def _measure(views: Sequence[StoredColors]) -> Viewpoints:
-    """Return the viewpoints of views from the first, searched twice as far in smaller copies if few are measured."""
-    for search in (1, 2):
-        shrink = max(round(max(image_size(views[0])) * search / LONGEST_PX), 1)
-        reference, *others = (luma_of(view, shrink) for view in views)
-        found = measure_viewpoints(reference, others, search * SEARCH_SHARE)
-        if found.is_measured.sum() >= min(MIN_MEASURED, len(others)):
-            break
-    return found
+def _views_to_match(places: NDArray[np.float64], reference: int) -> list[int]:
+    """Return up to MAX_MATCHED views, by index, that lie on eight rays from a reference: near ones, and some far ones.
 
-
-def views_around(places: Sequence[GridIndex], reference: int) -> list[int]:
-    """Return up to MAX_MEASURED views on eight rays from a reference, by index: the nearest, and some farther ones."""
-    return _choose(_ranks(places, reference))
-
-
-def _views_to_measure(orders: Sequence[Sequence[GridIndex]], reference: int) -> list[int]:
-    """Return the same of the orders that are possible: a view counts as near if it is in any of them."""
-    ranks: dict[int, float] = {}
-    for places in orders:
-        for index, rank in _ranks(places, reference).items():
-            ranks[index] = min(ranks.get(index, math.inf), rank)
-    return _choose(ranks)
-
-
-def _ranks(places: Sequence[GridIndex], reference: int) -> dict[int, float]:
-    """Return the distances of views on eight rays from a reference."""
-    row, column = places[reference]
-    steps = {
-        index: sorted((abs(r - row), abs(c - column))) for index, (r, c) in enumerate(places) if index != reference
-    }
-    return {index: most + 0.1 * least for index, (least, most) in steps.items() if least in (0, most)}
-
-
-def _choose(ranks: dict[int, float]) -> list[int]:
-    ordered = sorted(ranks, key=lambda index: ranks[index])
-    near, far = ordered[: MAX_MEASURED // 2], ordered[MAX_MEASURED // 2 :]
-    spread = np.linspace(0, len(far) - 1, min(len(far), MAX_MEASURED // 2)).round().astype(int)
+    places: (A, N, 2), row and column of each view in each arrangement; a view counts where it is nearest.
+    """
+    least, most = np.sort(np.abs(places - places[:, [reference]]), axis=2).transpose(2, 0, 1)
+    is_on_ray = ((least == 0) | (least == most)) & (most > 0)
+    away = np.where(is_on_ray, most + 0.1 * least, np.inf).min(axis=0)
+    ordered: list[int] = np.argsort(away, kind="stable")[: np.count_nonzero(np.isfinite(away))].tolist()
+    near, far = ordered[: MAX_MATCHED // 2], ordered[MAX_MATCHED // 2 :]
+    spread = np.linspace(0, len(far) - 1, min(len(far), MAX_MATCHED // 2)).round().astype(int)
     return near + [far[k] for k in dict.fromkeys(spread.tolist())]
 
 
-def _fit(arrangement: Arrangement, places: NDArray[np.float64], found: Viewpoints) -> Fit | None:
-    """Return how measured viewpoints fit an arrangement, None if they contradict it or do not suffice.
+def _best_fit(
+    textures: NDArray[np.float32], places: dict[Arrangement, NDArray[np.float64]]
+) -> tuple[Fit | None, Verdict]:
+    """Return the arrangement in which views match best, None if others do as well or none does, and the verdict.
 
-    places: (N, 2), row and column of each view from the reference.
+    textures: (N + 1, H, W), the reference first. places: (N, 2) of the other views from it, by arrangement.
     """
-    assert arrangement.grid is not None
-    is_measured, lengths = found.is_measured, arrangement.grid
-    places, offsets, weights = (
-        places[is_measured].astype(float),
-        found.offsets[is_measured],
-        found.agreeing[is_measured],
-    )
-    used = [axis for axis in (0, 1) if lengths[axis] > 1]
-    if len(places) < min(MIN_MEASURED, len(is_measured)) or not all(np.any(places[:, axis]) for axis in used):
-        return None
-    axes, is_kept = np.zeros((2, 2)), np.ones(len(places), np.bool_)  # rows: (t, s) of a step down, of one to the right
-    for _ in range(ROUNDS):
-        root = np.sqrt(weights[is_kept])[:, None]
-        axes[used] = np.linalg.lstsq(places[is_kept][:, used] * root, offsets[is_kept] * root, rcond=None)[0]
-        away = np.hypot(*(offsets - places @ axes).T)
-        is_kept = away <= np.quantile(away, MIN_FITTING)
-    along, across = axes.diagonal()[used], axes[:, ::-1].diagonal()[used]
-    if not (np.abs(along) > 0).all() or (np.abs(across) > MAX_SKEW * np.abs(along)).any():
-        return None
-    lengths_of_steps = np.abs(axes.diagonal()) if len(used) == 2 else np.abs(along)
-    stray = float(np.quantile(np.hypot(*((offsets - places @ axes) / lengths_of_steps).T), MIN_FITTING))
-    max_stray = MAX_STRAY if len(used) == 2 else min(MAX_STRAY_ON_LINE, MAX_STRAY_SHARE * np.abs(places).max())
-    if stray > max_stray:
-        return None
-    return Fit(arrangement, (float(axes[0, 0]), float(axes[1, 1])), stray, len(places))
+
+    def match(arrangement: Arrangement, row_step: float) -> Fit:
+        at = places[arrangement]
+        return Fit(arrangement, at, row_step, *_match(textures, at * (row_step, 1)))
+
+    tries = [(order, sign) for order, at in places.items() for sign in ((1, -1) if at.any(axis=0).all() else (1,))]
+    fits = sorted(in_pieces(lambda tried: match(*tried), tries, tiling.THREADS), key=_misfit)
+    uneven = [(fit, step) for fit in fits[:LIKELY_ORDERS] if fit.has_both_axes for step in ROW_STEPS]
+    fits += in_pieces(lambda tried: match(tried[0].arrangement, tried[0].row_step * tried[1]), uneven, tiling.THREADS)
+    fits.sort(key=_misfit)
+    best = fits[0]
+    still = replace(best, least=np.sqrt(np.square(textures[1:] - textures[0]).mean(axis=0)))
+    next_best = min([fit for fit in fits if not fit.is_mirrored_by(best)] + [still], key=_misfit)
+    better = next_best.least - best.least
+    votes = np.abs(better) > MIN_DIFFERENCE
+    if (still.least - best.least > MIN_DIFFERENCE).mean() < MIN_VOTING:
+        return None, "silent"
+    if votes.mean() < MIN_VOTING or (better[votes] > 0).mean() < MIN_AGREEING:
+        return None, "contrary" if best.least.sum() > MAX_DIFFERENCE_SHARE * best.mean.sum() else "silent"
+    even = match(best.arrangement, math.copysign(1, best.row_step))
+    for change in ROW_STEP_CHANGES if best.has_both_axes else ():
+        best = min([best, *(match(best.arrangement, best.row_step * change**k) for k in (1, -1))], key=_misfit)
+    return even if _misfit(even) <= EVEN_FACTOR * _misfit(best) else best, "clear"
 
 
-def _with_flip(fit: Fit, scene: MultiView, given: Arrangement) -> Fit:
+def _misfit(fit: Fit) -> float:
+    """Return the mean difference."""
+    return float(fit.least.mean())
+
+
+def _match(textures: NDArray[np.float32], offsets: NDArray[np.float64]) -> tuple[FloatImage, FloatImage]:
+    """Return the root mean square difference (H, W) of views at the best disparity, and that over all disparities.
+
+    offsets: (N, 2), (t, s) of the views after the first.
+    """
+    from_reference = np.concatenate([np.zeros((1, 2)), offsets]).astype(np.float32)
+    size, reach = image_size(textures[0]), float(np.abs(offsets).max())
+    everything = np.ones((1, len(textures)), np.bool_)
+    count = 2 * round(MAX_SHIFT_SHARE * max(size) / STEP_PX) + 1
+    squares = np.empty((count, *size), np.float32)
+    for k in range(count):
+        disparity = np.float32((k - count // 2) * STEP_PX / reach)
+        match_at(textures, from_reference, everything, disparity, squares[k : k + 1])
+    # A parabola through the least value and its neighbours: parallax may be smaller than a step.
+    middle = np.clip(squares.argmin(axis=0), 1, count - 2)
+    before, least, after = (np.take_along_axis(squares, middle[None] + k, 0)[0] for k in (-1, 0, 1))
+    bend = before - 2 * least + after
+    least = np.where(bend > 0, least - (after - before) ** 2 / (8 * np.maximum(bend, 1e-12)), least)
+    return np.sqrt(np.maximum(least, 0)), np.sqrt(squares.mean(axis=0))
+
+
+def _with_flip(fit: Fit, given: Arrangement) -> Fit:
     """Return the fit with the flip that its steps suggest, and the distance of rows."""
-    down, across = fit.steps
-    flip: Flip = given.flip or fit.arrangement.flip or ("y" if down * across < 0 else "none")
-    ratio = abs(down / across) if down and across else 1.0
-    equal = EQUAL_STATED_STEPS if scene.is_stated else EQUAL_STEPS
-    row_step = 1.0 if abs(ratio - 1) <= equal else round(ratio, 3)
+    flip: Flip = given.flip or fit.arrangement.flip or ("y" if fit.row_step < 0 else "none")
+    ratio = abs(fit.row_step)
+    row_step = 1.0 if abs(ratio - 1) <= EQUAL_STEPS else round(ratio, 3)
     return replace(fit, arrangement=replace(fit.arrangement, flip=flip, row_step=row_step))

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from iibr_core.depth.multi_view.estimate import CoarseDisparity, estimate_coarse
-from iibr_core.depth.multi_view.matching import luma_of
+from iibr_core.depth.multi_view.matching import choose_views, luma_of
 from iibr_core.depth.multi_view.near_side import nearness_ratio
-from iibr_core.depth.multi_view.order_by_parallax import Fit, Verdict, find_order, views_around
+from iibr_core.depth.multi_view.order_by_parallax import Fit, Verdict, find_order
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given, is_quilt
 from iibr_core.formats.light_fields.views import grid_of, in_order_of, view_offsets
@@ -98,7 +98,7 @@ def settle(
     if fit is None:
         order = UNKNOWN if given == UNKNOWN else as_given(field, given)
         return replace(_placed(field, ordered, order, 0, is_sure=True, is_left=is_left), verdict=verdict)
-    settled = _placed(field, ordered, fit.arrangement, fit.measured, is_sure=given.flip is not None)
+    settled = _placed(field, ordered, fit.arrangement, len(fit.places), is_sure=given.flip is not None)
     return settled if settled.is_sure else _faced(settled, settled.coarse.values, CLEAR_RATIO)
 
 
@@ -136,8 +136,7 @@ def _placed(
 
 def _faced(settled: Settled, values: FloatImage, clear_ratio: float) -> Settled:
     """Return the field, turned round if what it hides shows that it is seen from behind. values: of its centre."""
-    places = [(view.row, view.column) for view in settled.views]
-    chosen = [0, *views_around(places, 0)[-COMPARED_VIEWS:]]
+    chosen = [0, *choose_views(settled.offsets, 0)[1:][-COMPARED_VIEWS:]]
     size = image_size(values)
     shrink = -(-max(size) // COMPARED_PX)
     height, width = (length // shrink for length in size)

@@ -10,8 +10,8 @@ from iibr_core.depth.multi_view.matching import (
     HIDDEN_FACTOR,
     MAX_TEXTURE_DIFFERENCE,
     MIN_SEEN_SHARE,
-    _match,
     _store_costs,
+    match_at,
     view_groups,
 )
 from iibr_core.depth.multi_view.plain_areas import (
@@ -55,7 +55,7 @@ def test_matching_equals_its_slow_twin(disparity):
     offsets = np.float32([(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1), (1, -1), (-2, 2)])
     groups = view_groups(offsets)
     found = np.empty((len(groups), 7, 8), np.float32)
-    _match(textures, offsets, groups, np.float32(disparity), found)
+    match_at(textures, offsets, groups, np.float32(disparity), found)
     for y, x in np.ndindex(7, 8):
         costs = {}
         for view, (t, s) in enumerate(offsets[1:], 1):

@@ -11,7 +11,10 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from iibr_core.depth.multi_view.near_side import nearness_ratio
+from iibr_core.depth.multi_view.order_by_parallax import find_order
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.order import Arrangement
+from iibr_core.formats.light_fields.views import in_order_of, read_views
 from iibr_core.scenes.light_fields import find_disparity, open_settled
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
@@ -239,3 +242,39 @@ def test_hidden_places_show_which_side_is_near(sign: int) -> None:
     ratio = nearness_ratio(lumas, [ViewOffset(sign * t, sign * s) for t, s in offsets], sign * truth)
     assert ratio**sign > 2
     assert nearness_ratio(lumas, offsets, np.zeros_like(truth)) == 1
+
+
+def test_views_that_disagree_about_the_near_side_leave_it_open() -> None:
+    rng = np.random.default_rng(4)
+    lumas = [np.float32(rng.random((60, 80))) for _ in range(5)]
+    values = np.float32(gaussian_filter(rng.normal(size=(60, 80)), 3) * 30)
+    offsets = [ViewOffset(0.0, 0.0), *(ViewOffset(0.0, float(s)) for s in (-2, -1, 1, 2))]
+    assert nearness_ratio(lumas, offsets, values) == pytest.approx(1, abs=0.05)
+
+
+@pytest.mark.parametrize(("disparity_px", "is_uneven"), [(0.2, False), (14.0, False), (0.6, True)])
+def test_the_order_is_found_by_tiny_and_large_parallax_and_in_uneven_light(
+    tmp_path: Path, disparity_px: float, is_uneven: bool
+) -> None:
+    """The large one is a seventh of the width; exposure and vignetting differ from view to view."""
+    rough = np.random.default_rng(5).normal(size=(2, 140, 160))
+    halves = [0.5 + gaussian_filter(half, 1.5) for half in rough]
+    for row, column in grid(3, 3):
+        y, x = np.mgrid[:80, :100] + 30.0
+        views = [
+            map_coordinates(half, [y + d * (row - 1), x + d * (column - 1)], order=1)
+            for half, d in zip(halves, (disparity_px, -disparity_px / 2))
+        ]
+        luma = np.where(x < 80, *views)
+        if is_uneven:
+            v, u = np.mgrid[-1:1:80j, -1:1:100j]
+            luma *= (0.8 + 0.03 * (3 * row + column)) * (1 - 0.15 * (v**2 + (u - 0.1 * column) ** 2))
+        Image.fromarray((255 * luma).clip(0, 255).astype(np.uint8)).convert("RGB").save(
+            tmp_path / f"lf_{column}_{row}.png"
+        )
+    field = open_light_field(tmp_path)
+    views = [view.colors for view in in_order_of(field, list(read_views(field)[1]))]
+    fit, verdict = find_order(field, views)
+    assert fit is not None
+    assert verdict == "clear"
+    assert (fit.arrangement.order, fit.arrangement.flip, fit.arrangement.row_step) == ("columns", "none", 1.0)
