@@ -33,6 +33,7 @@ def test_a_quilt_is_shown(bridge, source, tmp_path, monkeypatch) -> None:
     assert entry["uri"] == str(out), "an absolute path: Bridge has another working folder"
     assert (entry["cols"], entry["rows"], entry["view_count"], entry["aspect"]) == (8, 6, 48, 1.5)
     assert dict(bridge.requests)["play_playlist"]["head_index"] == -1
+    assert dict(bridge.requests)["show_window"]["show_window"] is True
 
 
 TROUBLE = {

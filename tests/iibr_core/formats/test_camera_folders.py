@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.formats.cameras import FieldCameras, write_llff, write_nerfstudio
 from iibr_core.formats.colmap import write_colmap
@@ -17,11 +18,15 @@ GRID = GridShape(2, 3)
 OFFSETS = {f"v{v:02d}_u{u:02d}.png": GRID.offset(v, u) for v, u in np.ndindex(*GRID)}
 
 
-def write_scene(folder: Path, kind: str, offsets: dict[str, ViewOffset], at_infinity: float = 0.0) -> Path:
-    """Write pictures, brighter from name to name, and their cameras."""
+def write_scene(
+    folder: Path, kind: str, offsets: dict[str, ViewOffset], at_infinity: float = 0.0, orientation: int = 1
+) -> Path:
+    """Write pictures and their cameras."""
     (folder / "images").mkdir(parents=True)
-    for k, name in enumerate(sorted(offsets)):
-        write_image(folder / "images" / name, np.full((*SIZE, 3), (k + 1) / 20, np.float32))
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    for name in offsets:
+        Image.new("RGB", SIZE[::-1]).save(folder / "images" / name, exif=exif)
     cameras = FieldCameras(GRID, SIZE, 20.0, (1.0, 4.0), at_infinity)
     if kind == "COLMAP":
         write_colmap(folder, cameras, offsets, np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8))
@@ -76,6 +81,16 @@ def test_worlds_may_be_turned_and_cameras_stand_a_little_off(tmp_path) -> None:
     assert scene.grid == GRID
     assert [view.place for view in scene.views] == list(np.ndindex(*GRID))
     assert scene.views[1].offset.s - scene.views[0].offset.s == pytest.approx(0.96, abs=0.02), "as they stand"
+
+
+def test_turned_pictures_have_turned_viewpoints(tmp_path) -> None:
+    """What such a picture stores to the right is shown below."""
+    offsets = {name.replace("png", "jpg"): at for name, at in OFFSETS.items()}
+    scene = open_light_field(write_scene(tmp_path / "scene", "nerfstudio", offsets, orientation=6))
+    assert (scene.grid, scene.layout) == ((3, 2), "nerfstudio, 2x3")
+    for view, (v, u) in zip(scene.views, np.ndindex(*GRID)):
+        assert view.place == (u, 1 - v)
+        assert np.subtract(view.offset, scene.views[0].offset) == pytest.approx((u, -v))
 
 
 TURNED = [[0.995, 0, 0.0998, 0], [0, 1, 0, 0], [-0.0998, 0, 0.995, 0], [0, 0, 0, 1]]

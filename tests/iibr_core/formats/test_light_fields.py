@@ -12,7 +12,7 @@ from iibr_core.evaluation.scenes import read_scene
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views, row_step_of
-from iibr_core.formats.light_fields.write import WRITERS, FieldScale, write_light_field
+from iibr_core.formats.light_fields.write import WRITERS, FieldScale, note_on_rows, write_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core import known_scenes as known
@@ -59,6 +59,7 @@ def test_rows_stand_as_far_apart_as_positions_in_names_say_but_for_jitter(tmp_pa
         write_image(tmp_path / f"out_{row:02d}_{column:02d}_{y:.3f}_{x:.3f}.png", np.zeros((4, 4, 3), np.float32))
     found = row_step_of(open_light_field(tmp_path))
     assert found == pytest.approx(row_step, rel=0.0 if row_step == 1 else 0.02)
+    assert (note_on_rows(found) is None) == (row_step == 1)
 
 
 def test_the_range_is_stated_or_that_of_the_map_nearest_to_the_centre(tmp_path) -> None:

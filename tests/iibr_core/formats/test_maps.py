@@ -3,6 +3,7 @@ import struct
 
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 
 from iibr_core.formats.images.write import write_image_file
@@ -51,7 +52,7 @@ def test_resampling_agrees_with_its_slow_twin(size) -> None:
     assert nearest_pixels(np.arange(9)[None], ImageSize(1, 3)).tolist() == [[1, 4, 7]], "the middle ones"
 
 
-@pytest.mark.parametrize("name", ["a.pfm", "a.npy", "a.npz", "a.exr", "a.tif", "a.png"])
+@pytest.mark.parametrize("name", ["a.pfm", "a.npy", "a.npz", "a.exr", "a.tif", "32 bits.tif", "a.png"])
 def test_every_kind_of_file_gives_the_same_values(tmp_path, name) -> None:
     whole, path = RNG.integers(1, 20, (6, 8)), tmp_path / name
     if path.suffix == ".pfm":
@@ -60,6 +61,8 @@ def test_every_kind_of_file_gives_the_same_values(tmp_path, name) -> None:
         np.save(path, whole)
     elif path.suffix == ".npz":
         np.savez_compressed(path, depth=whole, other=np.zeros(3))
+    elif name == "32 bits.tif":
+        tifffile.imwrite(path, whole.astype(np.uint32))
     else:
         kind = "float" if path.suffix == ".exr" else "uint16"
         write_image_file(path, whole[..., None].astype(kind.replace("float", "float32")), kind, channels=("Y",))
