@@ -109,7 +109,8 @@ def cubic_on_surface(images, surfaces, index, x, y, d, parallax):
     total = red = green = blue = np.float32(0.0)
     low_r = low_g = low_b = np.float32(np.inf)
     high_r = high_g = high_b = np.float32(-np.inf)
-    taps = 0
+    near_r = near_g = near_b = np.float32(0.0)
+    taps, nearest = 0, np.inf
     for j in range(4):
         v, wy = np.uint64(min(max(row - 1 + j, 0), height - 1)), weight_y[j]
         for i in range(4):
@@ -121,6 +122,9 @@ def cubic_on_surface(images, surfaces, index, x, y, d, parallax):
                 total, red, green, blue = total + w, red + w * r, green + w * g, blue + w * b
                 low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
                 high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
+                distance = (np.int64(u) - x) ** 2 + (np.int64(v) - y) ** 2
+                if distance < nearest:
+                    nearest, near_r, near_g, near_b = distance, r, g, b
                 taps += 1
     # The whole kernel: its weights sum to 1, and it may overshoot as everywhere.
     if taps == 16:
@@ -130,30 +134,12 @@ def cubic_on_surface(images, surfaces, index, x, y, d, parallax):
         return cubic(images, index, x, y)
     # Next to no weight, or a negative one, is left: dividing by it would blow up noise.
     if total < MIN_TAP_WEIGHT:
-        return _nearest_tap(images, surfaces, k, x, y, own, tolerance)
+        return np.float64(near_r), np.float64(near_g), np.float64(near_b)
     # Normalised over the remaining taps. Without the other lobes it may overshoot, so it is clipped to their range.
     return (
         np.float64(min(max(red / total, low_r), high_r)),
         np.float64(min(max(green / total, low_g), high_g)),
         np.float64(min(max(blue / total, low_b), high_b)),
-    )
-
-
-@kernel
-def _nearest_tap(images, surfaces, k, x, y, own, tolerance):
-    """Return the colour of the nearest of the 16 pixels around a position that are on its surface; at least one is."""
-    _, height, width = surfaces.shape
-    column, row, nearest = floor(x), floor(y), np.inf
-    near_x = near_y = np.uint64(0)
-    for v in range(max(row - 1, 0), min(row + 3, height)):
-        for u in range(max(column - 1, 0), min(column + 3, width)):
-            distance = (u - x) ** 2 + (v - y) ** 2
-            if distance < nearest and abs(surfaces[k, v, u] - own) <= tolerance:
-                nearest, near_x, near_y = distance, np.uint64(u), np.uint64(v)
-    return (
-        np.float64(images[k, near_y, near_x, 0]),
-        np.float64(images[k, near_y, near_x, 1]),
-        np.float64(images[k, near_y, near_x, 2]),
     )
 
 
@@ -212,8 +198,7 @@ def _look_up_run(flat, begin, pitch, across, down, first, end, colors, to):
     values; begin, pitch: where those of the first ray's pixel begin, and how far it is to the next row; to: where in
     colors they go.
     """
-    one, three, six, nine = np.float32(1.0), np.uint64(3), np.uint64(6), np.uint64(9)
-    steep, bent = KEYS_A + np.float32(2.0), KEYS_A + np.float32(3.0)
+    three, six, nine = np.uint64(3), np.uint64(6), np.uint64(9)
     # Unsigned indices need no test for counting from the end: so the loop runs eight values at a time.
     a, to = np.uint64(begin - pitch - 3), np.uint64(to)
     b = a + np.uint64(pitch)
@@ -221,13 +206,7 @@ def _look_up_run(flat, begin, pitch, across, down, first, end, colors, to):
     d = c + np.uint64(pitch)
     at = np.uint64(3 * first)
     for i in range(np.uint64(3 * (end - first))):
-        # `keys_weights`, twice.
-        f, v = across[at + i], down[at + i]
-        g, w = one - f, one - v
-        x0, x1 = KEYS_A * f * g * g, one - f * f * (bent - steep * f)
-        x2, x3 = one - g * g * (bent - steep * g), KEYS_A * g * f * f
-        y0, y1 = KEYS_A * v * w * w, one - v * v * (bent - steep * v)
-        y2, y3 = one - w * w * (bent - steep * w), KEYS_A * w * v * v
+        (x0, x1, x2, x3), (y0, y1, y2, y3) = keys_weights(across[at + i], KEYS_A), keys_weights(down[at + i], KEYS_A)
         # Separable: along the rows, then across them. Single precision is far finer than an 8-bit step.
         a_, b_, c_, d_ = a + i, b + i, c + i, d + i
         colors[to + i] = max(

@@ -94,26 +94,13 @@ def _move(disparity, least_step, most_step, first, last, moved):
 def _mark_edge_bands(disparity, edge_step, first, last, is_edge_band):
     """Write rows [first, last): which pixels have a neighbour on the other side of a depth edge."""
     height, width = disparity.shape
-    one = np.uint64(1)
     for y in range(first, last):
-        above, here, below = disparity[max(y - 1, 0)], disparity[y], disparity[min(y + 1, height - 1)]
-        for x in (0, width - 1):
-            left, right = max(x - 1, 0), min(x + 1, width - 1)
-            is_edge_band[y, x] = _is_beside_edge(above, here, below, left, x, right, edge_step)
-        # Unsigned indices need no test for counting from the end: so pixels are compared many at a time.
-        for x in range(one, np.uint64(max(width - 1, 1))):
-            is_edge_band[y, x] = _is_beside_edge(above, here, below, x - one, x, x + one, edge_step)
-
-
-@kernel
-def _is_beside_edge(above, here, below, left, x, right, edge_step):
-    own = here[x]
-    # Without branches, so that `_mark_edge_bands` is vectorised.
-    is_above = (abs(above[left] - own) > edge_step) | (abs(above[x] - own) > edge_step)
-    is_below = (abs(below[left] - own) > edge_step) | (abs(below[x] - own) > edge_step)
-    is_above |= abs(above[right] - own) > edge_step
-    is_below |= abs(below[right] - own) > edge_step
-    return is_above | is_below | (abs(here[left] - own) > edge_step) | (abs(here[right] - own) > edge_step)
+        for x in range(width):
+            own, nearest, farthest = disparity[y, x], disparity[y, x], disparity[y, x]
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    nearest, farthest = max(nearest, disparity[v, u]), min(farthest, disparity[v, u])
+            is_edge_band[y, x] = nearest - own > edge_step or own - farthest > edge_step
 
 
 @kernel
