@@ -8,12 +8,10 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import MAKING, Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.iibr_core.known_scenes import write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
-from viewer.model.layout import layout_of
 
 
 @pytest.fixture
@@ -31,41 +29,12 @@ def test_the_centre_view_is_the_photo_letterboxed_where_there_is_room(viewer, ph
     assert (wide[:, :20] == wide[0, 0]).all()
 
 
-def test_panels_stand_beside_the_same_picture(viewer):
-    size = (1000, 700)
-    viewer.do(do(lens.move_eye, ViewOffset(0.5, 1)), do(lens.set_aperture, 2))
-    screen = viewer.screen(size)
-    layout = layout_of(size, (WIDTH, HEIGHT))
-    x, y, width, height = layout.frame_px
-    box = screen[y : y + height, x : x + width].astype(int)
-    notices_are_below = height - 120  # the notice about the scene may lie over the lower edge
-    expected = viewer.picture((width, height)).astype(int)
-    assert np.abs(box - expected)[:notices_are_below].max() <= 1
-    panel = screen[:, int(layout.panel.x) :]
-    assert panel.std() > 10, "text and sliders"
-    assert (panel[0, -1] == panel[-1, -1]).all()
-    np.testing.assert_array_equal(viewer.screen(size), screen)
-
-
 @pytest.mark.parametrize("pixels", [np.zeros((1, 1, 3)), np.full((7, 1, 3), 128)])
 def test_tiny_photos_open(tmp_path, viewer, pixels):
     write_image(tmp_path / "tiny.png", pixels.astype(np.uint8))
     viewer.open(Source(str(tmp_path / "tiny.png")))
     np.testing.assert_array_equal(viewer.picture(), pixels)
     assert viewer.screen((800, 600)).shape == (600, 800, 3)
-
-
-def test_light_fields_of_other_layouts_open(tmp_path, viewer):
-    """Stanford's names, whose rows count upwards, and a stereo pair: what is seen are the views on disk."""
-    stanford = write_stanford(tmp_path / "stanford", 3, 3)
-    viewer.open(Source(str(stanford)))
-    for eye, name in ((ViewOffset(0, 0), "out_01_01_-1.0_1.0"), (ViewOffset(-1, 1), "out_02_02_-2.0_2.0")):
-        viewer.do(do(lens.move_eye, eye))
-        assert np.abs(viewer.picture() / 255 - read_photo(stanford / f"{name}.png").pixels).max() < 1.5 / 255
-    viewer.open(Source(str(write_stereo_pair(tmp_path / "pair"))))
-    assert viewer.state.scene.grid == (1, 2)
-    right = read_photo(tmp_path / "pair" / "im1.png").pixels
-    assert np.abs(viewer.picture() / 255 - right).max() < 1.5 / 255
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.types import GridShape, ViewOffset
-from viewer.display.picking import LANDING_RADIUS_PX, is_kept_for_picking, pick_disparity
+from iibr_core.types import ViewOffset
+from viewer.display.picking import LANDING_RADIUS_PX, pick_disparity
 
 CENTRE = ViewOffset(0.0, 0.0)
 
@@ -24,22 +24,7 @@ def test_picks_what_the_slow_twin_picks(seed, t, s, x, y):
         assert picked in disparity
 
 
-def test_the_nearer_of_two_surfaces_wins_where_they_overlap():
-    disparity = np.zeros((9, 21), np.float32)
-    disparity[:, 12:] = 4.0  # in view s = 1 its left border moves from 12 to 8
-    assert pick_disparity({CENTRE: disparity}, ViewOffset(0, 1), 9, 4) == 4.0
-    assert pick_disparity({CENTRE: disparity}, ViewOffset(0, 1), 6, 4) == 0.0
-    assert pick_disparity({CENTRE: disparity}, CENTRE, 9, 4) == 0.0
-
-
 def test_the_map_nearest_to_the_eye_is_asked():
     maps = {CENTRE: np.zeros((4, 4), np.float32), ViewOffset(0, 4): np.full((4, 4), 0.25, np.float32)}
     assert pick_disparity(maps, ViewOffset(0, 1.9), 2, 2) == 0.0
     assert pick_disparity(maps, ViewOffset(0, 2.1), 2, 2) == 0.25
-
-
-def test_at_most_nine_maps_are_kept_the_centre_among_them():
-    for grid in (GridShape(9, 9), GridShape(8, 17), GridShape(1, 1), GridShape(2, 3)):
-        kept = [(r, c) for r in range(grid.rows) for c in range(grid.columns) if is_kept_for_picking(grid, r, c)]
-        assert grid.centre in kept
-        assert len(kept) <= 9

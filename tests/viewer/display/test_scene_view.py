@@ -11,7 +11,7 @@ from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import headless_with_scene, write_scene
 from viewer.display import scene_view
 from viewer.display.offscreen import OffscreenScene
@@ -40,24 +40,6 @@ def a_view_comes(view):
     centre = view.centre
     view.add(replace(centre, row=0, column=1, colors=np.full_like(centre.colors, 255)))
     view.upload_all()
-
-
-def test_a_view_that_comes_costs_no_frame_all_passes(opened):
-    view = opened.view
-    opened.do(do(lens.move_eye, ViewOffset(-0.5, 0.3)))
-    view.converge(opened.state, SIZE)
-    passes, before = view.renderer.passes_shown, view.renderer.read_image()
-    assert passes > 1
-    a_view_comes(view)
-    frames = 0
-    while np.array_equal(view.renderer.read_image(), before):
-        view.renderer._refining_s = 1.0  # a slow machine
-        view.draw(opened.state, SIZE)
-        frames += 1
-        assert view.renderer.passes_shown == passes
-    assert frames > passes, "at most a pass each, after the one that began it"
-    assert view.shows_all_views()
-    assert view.renderer.is_converged
 
 
 @pytest.mark.parametrize(
@@ -104,6 +86,16 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened):
     view.upload_all()
     view.converge(opened.state, SIZE)
     assert view.renderer.read_image().min() == 255
+
+
+def test_a_scene_too_large_for_the_driver_leaves_the_old_one(opened):
+    view, scene = opened.view, opened.state.scene
+    before = view.renderer.read_image()
+    with pytest.raises(InputError, match=r"px exceed"):
+        view.open(SceneReady(2, replace(scene, width=opened.gl.max_texture_size + 1), view.loaded, view.centre))
+    view.converge(opened.state, SIZE)
+    assert view.generation < 2
+    assert np.array_equal(view.renderer.read_image(), before)
 
 
 def psnr_db(image, other):

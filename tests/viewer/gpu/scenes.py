@@ -67,17 +67,6 @@ class TwoPlanes:
             renderer.field.set_hidden(hidden_surface(encoded_from_stored(colors), disparity, max(grid), seen))
 
 
-class PhotoLike(TwoPlanes):
-    """Its waves are of many lengths, and the higher the longer, as in photos: blurred more, it is always smoother."""
-
-    def _texture(self, x, y, hue):
-        random, waves = np.random.default_rng(round(hue)), np.zeros_like(x)
-        for period in np.geomspace(6, 60, 30):
-            angle, phase = 2 * np.pi * random.random(2)
-            waves += period * np.sin(2 * np.pi / period * (x * np.cos(angle) + y * np.sin(angle)) + phase)
-        return np.clip(0.5 + 0.0017 * waves[..., None] * np.array([1.0, 0.8, 0.6]), 0, 1)
-
-
 def through_lens(scene, optics, across=24):
     """The picture by brute force: the mean, in linear light, of cameras `across` the opening in each direction, each
     seeing the scene itself.
@@ -169,9 +158,3 @@ def rms(image, expected, border=8):
 def psnr(image, expected, border=8):
     """Likeness inside the border, dB."""
     return float(-20 * np.log10(max(rms(image, expected, border), 1e-9)))
-
-
-def sharpness(image, border=8):
-    """Mean step between neighbouring pixels inside the border, 1 = white."""
-    inside = image[border:-border, border:-border].astype(float) / 255
-    return float(np.abs(np.diff(inside, axis=0)).mean() + np.abs(np.diff(inside, axis=1)).mean())

@@ -55,11 +55,6 @@ def test_openings_against_point_tests(shape):
     assert weights.sum() == pytest.approx(expected.sum(), rel=0.01)
 
 
-def test_wholly_round_blades_are_a_disc():
-    rounded = opening(ApertureShape("polygon", blades=3, roundness=1.0), T, S, DIAMETER, WIDTH)
-    np.testing.assert_allclose(rounded, opening(ApertureShape(), T, S, DIAMETER, WIDTH))
-
-
 def test_mask_lies_upright_and_turns_clockwise():
     values = np.zeros((4, 8), np.uint8)
     values[0, 0], values[3] = 255, 51  # upper left corner open, lowest row a fifth

@@ -29,14 +29,6 @@ def full(renderer):
     return renderer.field
 
 
-def test_an_epi_is_one_line_of_every_view_of_its_row(renderer, passes):
-    line = Line(1, (30 + 0.5) / SCENE.height)
-    passes.draw_epi(full(renderer), line, (SCENE.width, BAND * GRID.columns), 1.0)
-    epi = passes.read("across")[..., :3].reshape(GRID.columns, BAND, SCENE.width, 3)[:, 1]
-    expected = [SCENE.view(GRID.offset(1, u))[0][30] for u in range(GRID.columns)]
-    np.testing.assert_allclose(epi, expected, atol=1)
-
-
 def test_an_upright_epi_is_one_column_of_every_view_of_its_column(renderer, passes):
     line = Line(4, (50 + 0.5) / SCENE.width, is_upright=True)
     passes.draw_epi(full(renderer), line, (BAND * GRID.rows, SCENE.height), 1.0)

@@ -30,24 +30,6 @@ def test_stores_root_of_linear_light_in_the_views_own_layer(gl):
     field.release()
 
 
-def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl):
-    field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
-    once = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr=False, with_disparity=True)
-    draft, final = np.zeros((4, 8, 3), np.uint8), np.full((4, 8, 3), 90, np.uint8)
-    near, far = np.full((4, 8), 2.0, np.float32), np.tile(np.linspace(-1, 2, 8, dtype=np.float32), (4, 1))
-    for texture in (field, once):
-        texture.upload(0, 0, final, far)  # both know the same range
-    field.upload(1, 1, draft, near)
-    for texture in (field, once):
-        texture.upload(1, 1, final, far)
-    for name in ("colors", "disparities"):
-        assert getattr(field, name).read() == getattr(once, name).read()
-    assert field.uploads.tolist() == [[1, 0, 0], [0, 2, 0]]
-    assert field.present.sum() == 2
-    field.release()
-    once.release()
-
-
 @pytest.mark.parametrize(
     ("box", "hdr"), [(np.s_[0:37, 0:53], True), (np.s_[5:6, 7:8], False), (np.s_[15:33, 20:53], False)]
 )

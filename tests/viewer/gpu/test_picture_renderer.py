@@ -25,15 +25,6 @@ def picture(renderer, scene=SCENE, **optics):
     return renderer.read_image()
 
 
-def test_centre_through_a_pinhole_is_the_photo(renderer, tmp_path):
-    random = np.random.default_rng(0)
-    photo = random.integers(0, 256, (40, 60, 3), dtype=np.uint8)
-    open_field(renderer, GridShape(9, 9), 60, 40)
-    renderer.field.upload(4, 4, photo, random.normal(size=(40, 60)).astype(np.float32))
-    renderer.render(Optics(focus_disparity=1.5), (60, 40))
-    assert_close(renderer.read_image(), photo, ROUNDING, tmp_path)
-
-
 @pytest.mark.parametrize("with_disparity", [True, False])
 def test_pinhole_at_stored_views_is_those_views(renderer, tmp_path, with_disparity):
     SCENE.fill(renderer, GRID, with_disparity)
@@ -49,14 +40,6 @@ def test_pinhole_between_views_against_the_scene(renderer):
         image = picture(renderer, eye=eye)
         assert rms(image, truth) < 0.025, "depth edges within a pixel, all else sharp"
         assert np.median(np.abs(image.astype(int) - truth)) <= 1
-
-
-def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer):
-    scene = TwoPlanes(radius_px=0.0)
-    scene.fill(renderer, GRID)
-    optics = Optics(ViewOffset(0.0, 4.0), focus_disparity=2.0, aperture_diameter=3.0)
-    truth = through_lens(scene, optics)
-    assert rms(settled(renderer, optics, scene), truth, border=14) < 0.01
 
 
 @pytest.mark.parametrize(

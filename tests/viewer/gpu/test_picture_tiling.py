@@ -2,31 +2,16 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, open_field
-from viewer.gpu.refocus.picture_drawing import MAX_TILE_PX, picture_tiles
+from viewer.gpu.refocus.picture_drawing import picture_tiles
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=1.0, radius_px=25.0)
 LARGE = 384, 256
-
-
-@given(width=st.integers(1, 900), height=st.integers(1, 70), largest=st.integers(64, 400))
-def test_every_pixel_is_kept_once_and_no_part_is_too_large(width, height, largest):
-    kept = np.zeros((height, width), np.uint8)
-    for part in picture_tiles((width, height), largest):
-        assert max(part.size_px) <= min(largest, MAX_TILE_PX)
-        kept[part.rows, part.columns] += 1
-        assert kept[part.rows, part.columns].shape == part.size_px[::-1]
-        left, top, across, down = part.window
-        assert (left * width, top * height) == pytest.approx((part.columns.start, part.rows.start))
-        assert (across * width, down * height) == pytest.approx(part.size_px)
-    assert (kept == 1).all()
 
 
 CAT_EYE = ApertureShape("cat_eye", cat_eye=1.0)

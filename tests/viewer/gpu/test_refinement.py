@@ -8,8 +8,8 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.beyond.picture_quality import EDGE_PASSES, MAX_SOURCES
-from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes, open_field, psnr
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.gpu.scenes import TwoPlanes, psnr
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=0.0, radius_px=25.0)
@@ -35,7 +35,7 @@ def test_a_hurried_picture_is_refined_in_small_steps_to_the_one_drawn_at_once(re
         renderer.refine(1e-6)
         steps += 1
     assert steps >= 2
-    assert hurried < 50
+    assert 30 < hurried < 50
     assert np.abs(renderer.read_image().astype(int) - at_once).max() <= 1
 
 
@@ -66,14 +66,6 @@ def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer):
     gc.collect()
     assert all(isinstance(thing, moderngl.mgl.InvalidObject) for thing in ctx.objects), "dropped, but not released"
     ctx.gc_mode = None
-
-
-def test_views_too_large_for_the_driver_leave_the_old_field(renderer, gl):
-    SCENE.fill(renderer, GRID)
-    before = converged(renderer, WIDE)
-    with pytest.raises(InputError, match=r"px exceed"):
-        open_field(renderer, GRID, gl.max_texture_size + 1, 4, with_disparity=False)
-    assert np.array_equal(converged(renderer, WIDE), before)
 
 
 @pytest.mark.parametrize("optics", [WIDE, Optics()], ids=("open", "pinhole"))

@@ -13,7 +13,6 @@ from viewer.gpu.refocus.view_sampling import pinhole_sources
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)
-places = st.builds(ViewOffset, st.floats(-6, 6), st.floats(-6, 6))
 
 
 def some_views(seed):
@@ -35,16 +34,6 @@ def shares_of_views(samples):
     return shares
 
 
-@given(eye=places, seed=st.integers(0, 50))
-def test_pinhole_weights_sum_to_one_over_present_views(eye, seed):
-    present = some_views(seed)
-    sources = pinhole_sources(eye, GRID, present)
-    assert sum(source.weight for source in sources) == pytest.approx(1, abs=1e-4)
-    assert len(sources) <= 4
-    assert all(present[source.row, source.column] and source.weight > 0 for source in sources)
-    assert view_sampling.pinhole_samples(sources[:2]).weights.sum() == pytest.approx(1)
-
-
 @given(eye=st.builds(ViewOffset, st.floats(-2, 2), st.floats(-2, 2)))
 def test_pinhole_weights_are_continuous_in_the_eye(eye):
     present = np.zeros(GRID, bool)  # so sparse that no cell is complete: the rule is one and the same
@@ -52,13 +41,6 @@ def test_pinhole_weights_are_continuous_in_the_eye(eye):
     here = weights_by_view(pinhole_sources(eye, GRID, present))
     beside = weights_by_view(pinhole_sources(ViewOffset(eye.t + 1e-4, eye.s - 1e-4), GRID, present))
     assert np.abs(here - beside).max() < 0.01
-
-
-def test_a_stored_view_alone_shows_its_own_place():
-    present = some_views(3)
-    for row, column in np.argwhere(present):
-        weights = weights_by_view(pinhole_sources(GRID.offset(int(row), int(column)), GRID, present))
-        assert weights[row, column] == pytest.approx(1, abs=1e-4)
 
 
 def test_missing_views_are_replaced_by_their_neighbours_in_an_aperture():

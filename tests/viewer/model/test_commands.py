@@ -13,7 +13,7 @@ from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import saving
 from viewer.model.action import do
 from viewer.model.app_state import AppState
-from viewer.model.commands import BY_NAME, CAMERA_STEP, COMMANDS, FONT_STEP, Chord, commands_matching, recent_commands
+from viewer.model.commands import BY_NAME, CAMERA_STEP, COMMANDS, FONT_STEP, Chord, commands_matching
 from viewer.model.demo_photo import demo_photo
 from viewer.model.inspection import Hover
 from viewer.model.layout import Zoom
@@ -86,26 +86,9 @@ def test_the_palette_finds_by_parts_of_words():
     assert commands_matching("") == COMMANDS
 
 
-def test_recent_files_come_first_in_the_list_but_for_the_open_one():
-    state = replace(state_with(scene_of()), recent=("photo.png", "/a/one.jpg", "/b/two.jpg"))
-    assert state.source.path == "photo.png"
-    listed = commands_matching("", recent_commands(state))
-    assert [command.name for command in listed[:2]] == ["Open one.jpg", "Open two.jpg"]
-    assert listed[2:] == COMMANDS
-    opened = reduce(state, listed[0].action(state)).source
-    assert opened.path == "/a/one.jpg"
-    assert [command.name for command in commands_matching("two", recent_commands(state))] == ["Open two.jpg"]
-
-
 @pytest.mark.parametrize("path", ["/home/a/.cache/iibr/clipboard/pasted/photo.png", str(demo_photo())])
 def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path):
     """A cache that is emptied, the demo's in the installation."""
     state = state_with(replace(scene_of(source=Source(path)), name="photo"))
     saved, exported = (reduce(state, action).prompt for action in (do(saving.ask_to_save), do(saving.ask_to_export)))
     assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-web.html")
-
-
-def test_commands_with_a_word_that_begins_so_come_first():
-    names = [command.name for command in commands_matching("entr")]
-    assert names.index("Overlay: entropy") < names.index("Centre the head")
-    assert commands_matching("stereo display")[0].name == "Stereo display"

@@ -12,7 +12,6 @@ from iibr_core.types import GridShape
 from tests.viewer.model.test_opening import scene_of
 from viewer.model.focal_plane import (
     MIN_HANDLE_DISTANCE,
-    focus_on,
     handle_points,
     place_of,
     sharp_disparity,
@@ -42,13 +41,6 @@ def test_handles_on_one_spot_move_the_plane_without_tipping_it():
     after = tilt_through(before, (0.2, 0.2), 2.0, (0.2, 0.21), 1.0)
     assert after.focus_tilt == before.focus_tilt
     assert sharp_disparity(after, (0.2, 0.2)) == pytest.approx(2.0)
-
-
-@given(places, disparities)
-def test_what_is_clicked_is_sharp_whatever_the_tilt(place, disparity):
-    after = focus_on(Optics(focus_tilt=(0.7, -0.3), focus_disparity=1), place, disparity)
-    assert sharp_disparity(after, place) == pytest.approx(disparity)
-    assert after.focus_tilt == (0.7, -0.3)
 
 
 def test_places_of_pixels_and_handles():

@@ -11,7 +11,7 @@ from tests.viewer.model.test_opening import scene_of
 from viewer.model import folder, inspection, opening
 from viewer.model.action import do
 from viewer.model.app_state import AppState
-from viewer.model.folder import AHEAD, filmstrip_range, photos_ahead
+from viewer.model.folder import filmstrip_range
 
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 
@@ -80,14 +80,6 @@ def test_a_photo_that_does_not_open_is_told_once_and_passed_by():
     state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert open_name(reduce(state, do(folder.step, -1))) == "img_9.jpg"
     assert reduce(damaged, do(opening.stop)).folder.unreadable == frozenset()
-
-
-def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step():
-    state = state_at("IMG_10.jpg")
-    assert [source.path[8:] for source in photos_ahead(state, AHEAD)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
-    back = reduce(reduce(state, do(folder.step, 1)), do(folder.step, -1))
-    assert [source.path[8:] for source in photos_ahead(back, AHEAD)] == ["img_9.jpg", "IMG_11.jpg"]
-    assert photos_ahead(AppState(), AHEAD) == ()
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from iibr_core.method.plan import ScenePlan
@@ -13,9 +12,8 @@ from tests.viewer.conftest import reduce
 from viewer.model import gesture, inspection, opening
 from viewer.model.action import do
 from viewer.model.app_state import AppState
-from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME
-from viewer.model.inspection import Hover, Inspection, Probe, beside_of, sheet_cells, view_at, view_near
+from viewer.model.inspection import Hover, Inspection, Probe, sheet_cells, view_at, view_near
 from viewer.model.layout import Beside, layout_of
 from viewer.model.preferences import Preferences
 from viewer.ui.overlays.inspection_overlay import legend_words, status_text
@@ -112,12 +110,6 @@ def test_strips_take_their_room_beside_the_picture_and_line_up_with_it():
     assert tiny.picture is tiny.strip_across is tiny.status is None
 
 
-def test_a_single_view_has_no_epis():
-    single = replace(OPEN, scene=replace(SCENE, grid=GridShape(1, 1)))
-    assert beside_of(inspection.show_epis(single, True)).epi_views is None
-    assert beside_of(inspection.show_epis(OPEN, True)).epi_views == (5, 7)
-
-
 @pytest.mark.parametrize("grid", [GridShape(1, 1), GridShape(3, 9), GridShape(17, 17)])
 def test_a_click_on_the_sheet_finds_the_view_drawn_there(grid):
     picture = Rect(12, 30, 600, 400)
@@ -147,12 +139,3 @@ def test_the_legend_speaks_the_units_of_the_panel():
     in_metres = replace(SCENE, inverse_metres=(0.1, 0.2))
     assert legend_words(shown, in_metres, ends) == ("distance", ["20 m", "2.50 m"])
     assert legend_words(inspection.set_overlay(OPEN, "entropy"), SCENE, (0.0, 1.0)) == ("entropy", ["0.00", "1.00"])
-
-
-def test_the_colour_map_grows_steadily_lighter():
-    colors = np.array([map_color(share) for share in np.linspace(0, 1, 100)])
-    assert (np.diff(colors @ [0.2126, 0.7152, 0.0722]) > 0).all()
-    for i, color in enumerate(VIRIDIS):
-        assert map_color(i / (len(VIRIDIS) - 1)) == pytest.approx([value / 255 for value in color], abs=1e-6)
-    assert map_color(-1) == map_color(0)
-    assert map_color(2) == map_color(1)

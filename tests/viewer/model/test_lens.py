@@ -86,29 +86,6 @@ def test_every_number_stays_finite_and_within_its_limits(grid, first, second, ti
     assert opening.kind != "mask", "there is no mask"
 
 
-@pytest.mark.parametrize(
-    ("action", "field", "value"),
-    [
-        (do(lens.set_dolly, 1.5), "dolly", 1.5),
-        (do(lens.set_focus_range, 0.25), "focus_range", 0.25),
-        (do(lens.set_focus_tilt, (0.5, -0.25)), "focus_tilt", (0.5, -0.25)),
-        (do(lens.set_aperture, 2.5), "aperture_diameter", 2.5),
-        (do(lens.set_highlights, 0.5), "highlight_recovery", 0.5),
-        (do(lens.set_exposure, -1.5), "exposure_stops", -1.5),
-        (do(lens.move_eye, ViewOffset(1, -2)), "eye", ViewOffset(1, -2)),
-        (do(lens.set_aperture_shape, ApertureShape("ring")), "aperture_shape", ApertureShape("ring")),
-        (do(lens.set_gloss, FIRST_GLOSS), "gloss", FIRST_GLOSS),
-    ],
-)
-def test_each_verb_changes_its_number_and_no_other(action, field, value):
-    shown = replace(state_with(scene_of()), shows_before=True)
-    edited = action.apply(shown)
-    assert edited.optics == replace(Optics(), **{field: value})
-    assert not edited.shows_before, "the picture is seen again"
-    assert history.undo(edited).optics == Optics()
-    assert action.apply(AppState()).optics == Optics(), "before a scene is open"
-
-
 # Presets
 
 

@@ -104,15 +104,6 @@ def test_stopping_while_another_file_is_read_returns_to_the_scene_that_is_open()
     assert (first.source, first.stopped, first.progress) == (None, 1, Progress())
 
 
-def test_views_that_came_are_known_until_another_field_is_made():
-    state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(GridShape(3, 3))))
-    assert state.views_there == {(1, 1)}
-    state = reduce(state, do(opening.set_progress, 1, Progress(2, 9, 0.1), (0, 2)))
-    assert state.views_there == {(1, 1), (0, 2)}
-    state = reduce(state, do(opening.show_scene, 1, scene_of(GridShape(5, 5))))
-    assert state.views_there == {(2, 2)}
-
-
 def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it():
     sketch = scene_of(source=SOURCE, is_sketch=True)
     state = reduce(state_with(None), do(opening.show_scene, 1, sketch))
@@ -132,13 +123,6 @@ def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it():
     stopped = reduce(state, do(opening.stop))
     assert stopped.stopped == 1
     assert stopped.scene is sketch
-
-
-def test_recent_files_are_listed_once_the_latest_first():
-    state = state_with(None)
-    for name in ("a.png", "b.png", "a.png"):
-        state = reduce(state, do(opening.show_scene, 1, scene_of(source=Source(name))))
-    assert state.recent == ("a.png", "b.png")
 
 
 def test_recent_files_of_one_name_are_told_apart_by_their_folders():

@@ -7,7 +7,6 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.f_numbers import ASSUMED_DISTANCE_M, equivalent_f_number, f_number
-from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.types import GridShape
 from tests.viewer.model.test_opening import plan_of, scene_of
 from viewer.model.inspection import Hover
@@ -15,7 +14,6 @@ from viewer.model.units import (
     disparity_at,
     distance_limits,
     f_number_text,
-    far_percent,
     metres,
     metres_text,
     relative_distance,
@@ -83,16 +81,6 @@ def test_the_equivalent_is_the_f_number_of_a_portrait_lens_that_blurs_alike():
     assert equivalent_f_number(scene, 3.0) == pytest.approx(stop * (85 / 36) ** 2)
 
 
-@pytest.mark.parametrize("scene", [scene_of(), scene_of(focal_px=80.0), scene_of(plan=plan_of(GridShape(9, 9)))])
-def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene):
-    assert f_number_text(scene, 0.0) == "pinhole"
-    stops = [equivalent_f_number(scene, diameter) or 0.0 for diameter in (1.0, 2.0, 4.0)]
-    assert stops[0] == pytest.approx(2 * stops[1]) == pytest.approx(4 * stops[2])
-    assert stops[2] > 0
-    assert f_number_text(scene, 2.0).startswith("≈ f/")
-    assert f_number_text(scene_at(still_m=2.0), 2.0).startswith("f/")
-
-
 def test_the_f_number_waits_for_the_depth_that_it_follows_from():
     for early in (scene_of(has_view_disparity=False), scene_of(is_sketch=True)):
         assert (f_number_text(early, 2.0), f_number_text(early, 0.0)) == ("f/…", "pinhole")
@@ -104,12 +92,6 @@ def test_metres_follow_from_the_disparity_that_metric_depth_became():
     assert metres(scene, -99.0) == math.inf
     assert metres(scene_of(), 1.0) is None
     assert [metres_text(m) for m in (0.421, 12.3, math.inf)] == ["0.42 m", "12 m", "∞"]
-
-
-def test_near_is_0_far_is_100_and_back():
-    scene = scene_of()
-    low, high = focus_limits(scene)
-    assert (far_percent(scene, high), far_percent(scene, low)) == (0.0, 100.0)
 
 
 @pytest.mark.parametrize(

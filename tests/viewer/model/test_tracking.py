@@ -71,12 +71,6 @@ def test_packets_that_are_no_poses_are_dropped(packet):
     assert head_in(packet) is None
 
 
-@given(st.binary(min_size=48, max_size=48))
-def test_every_place_of_the_head_is_finite(packet):
-    head = head_in(packet)
-    assert head is None or abs(head) <= math.hypot(1000, 1000)
-
-
 def test_the_viewpoint_slows_down_towards_the_outermost_views_and_stays_there():
     eyes = [tracked(0j, complex(cm)).optics.eye.s for cm in range(0, 40)]
     steps = np.diff(eyes)
@@ -189,28 +183,10 @@ def test_the_viewpoint_holds_while_something_else_needs_it(changes):
     assert again.optics.eye == tracked(0j, 9 + 0j).optics.eye
 
 
-def test_a_loop_goes_on_and_a_rack_leaves_the_viewpoint_to_the_head():
-    looping = viewpoint.set_loop(tracked(0j), "circle")
-    assert followed(looping, 9 + 0j).optics.eye == CENTRE
-    racked = replace(tracked(0j), chosen_focus=1.0, focus_before=0.0)
-    assert followed(viewpoint.rack_focus(racked), 9 + 0j).optics.eye.s > 0
-
-
-def test_following_is_no_edit_and_keeps_the_comparison_with_the_photo():
-    state = followed(lens.show_before(tracked(0j), True), 9 + 0j)
-    assert state.shows_before
-    assert not state.history.past
-
-
 def test_a_state_without_a_tracker_ignores_the_head():
     state = state_with(FIVE)
     actions = [do(tracking.follow, 3 + 0j, 1.0), do(tracking.set_receiving, True)]
     assert [action.apply(state) for action in actions] == [state, state]
-
-
-@pytest.mark.parametrize(("wanted", "got"), [(1.0, 3.0), (25.0, 25.0), (1e9, 60.0), (math.nan, 3.0)])
-def test_the_movement_is_limited(wanted, got):
-    assert tracking.set_head_range(tracked(), wanted).preferences.head_range_cm == got
 
 
 @pytest.mark.parametrize(

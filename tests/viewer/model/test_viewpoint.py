@@ -5,11 +5,9 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from iibr_core.beyond.optics import CENTRE
-from iibr_core.exports.loops import LOOPS, ease, point_on_loop
+from iibr_core.exports.loops import LOOPS, point_on_loop
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
@@ -20,7 +18,6 @@ from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.viewpoint import FORWARD_LIMITS, HOME_S, MAX_ASIDE, MAX_STEP_S, RACK_S, SPEED_LIMITS, FreeCamera
 
-grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
 NINE = GridShape(9, 9)
 
 
@@ -38,14 +35,6 @@ def ticked(state, seconds, start=100.0, step=1 / 60):
 
 
 # Loops and glides
-
-
-@given(grids, st.sampled_from(LOOPS), st.floats(0, 50))
-def test_loops_stay_between_the_stored_views_and_close(grid, kind, turns):
-    eye = point_on_loop(kind, turns, grid)
-    for value, views in zip(eye, grid):
-        assert -(views // 2) <= value <= views - 1 - views // 2
-    assert point_on_loop(kind, turns + 1, grid) == pytest.approx(eye, abs=1e-9)
 
 
 def test_the_shapes_of_the_loops():
@@ -112,10 +101,6 @@ def test_a_delay_is_no_leap_and_a_pause_holds():
 def test_a_hand_on_the_viewpoint_stops_the_motion_and_keeps_its_speed(action):
     state = action.apply(viewpoint.set_loop(viewpoint.set_speed(photo(), 0.5), "circle"))
     assert (state.motion.is_running, state.motion.speed) == (False, 0.5)
-
-
-def test_easing_is_flat_at_both_ends_and_clamped():
-    assert [ease(x) for x in (-1, 0, 0.25, 0.5, 1, 2)] == [0, 0, 0.15625, 0.5, 1, 1]
 
 
 # The focus rack

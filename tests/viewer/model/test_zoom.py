@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.scenes.rect import WHOLE
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
@@ -22,14 +21,6 @@ PLACES = (Zoom(1.0), Zoom(0.5, (0.0, 1.0)), Zoom(2.3, (0.31, 0.77)), Zoom(0.05),
 
 def laid_out(zoom, ratio=1.0):
     return layout_of(WINDOW, SIZE, ratio, zoom=zoom, own_width=OWN_WIDTH)
-
-
-def test_without_a_zoom_all_of_the_picture_is_seen():
-    layout = laid_out(None)
-    assert layout.frame == layout.picture
-    assert layout.part == WHOLE
-    assert layout.minimap is None
-    assert layout.scale == layout.fit < 1
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2.0])
@@ -99,13 +90,6 @@ def test_the_picture_follows_the_hand_as_far_as_it_goes():
     assert far.part.x == pytest.approx(0, abs=1e-3)
     assert laid_out(far.pulled(-5.0, 0.0)).part.x > far.part.x  # nothing is stored up beyond the border
     assert laid_out(None).pulled(30.0, 30.0) is None
-
-
-@pytest.mark.parametrize("zoom", [Zoom(-3.0), Zoom(0.0, (-7.0, 9.0)), Zoom(1e30, (0.2, 0.2))])
-def test_absurd_zooms_still_show_something(zoom):
-    frame_px = laid_out(reduce(STATE, do(viewpoint.set_zoom, zoom)).zoom).frame_px
-    assert min(frame_px.size) >= 1
-    assert max(frame_px.size) <= max(WINDOW)
 
 
 def test_another_photo_is_seen_whole_and_the_same_one_as_before():

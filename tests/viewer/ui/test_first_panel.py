@@ -63,18 +63,6 @@ def test_views_without_depth_say_whether_it_is_looked_for(first, progress, words
     assert depth_source(replace(first.state, progress=progress), scene) == words
 
 
-def test_more_brings_headings_and_advanced_two_more(first, built):
-    def headings():
-        first.screen(WINDOW)
-        return [name.partition("###section ")[2] for name in built.names("tree_node_ex")]
-
-    first.do(do(preferences.toggle_section, "more"))
-    more = ["More", "View", "Focus", "Aperture", "Light", "Gloss", "Depth", "Stereo display", "Advanced"]
-    assert headings() == more
-    first.do(do(preferences.toggle_section, "advanced"))
-    assert headings() == [*more, "Inspect", "Scene"]
-
-
 def test_what_is_open_within_a_closed_section_opens_again_with_it():
     state = AppState(preferences=Preferences(open_sections=with_sections((), "depth")))
     closed = reduce(state, do(preferences.toggle_section, "more"))
