@@ -6,10 +6,8 @@ import pytest
 
 from iibr_core.exports.photo_folder import FolderPhoto, in_order
 from iibr_core.scenes.scene import Source
-from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import scene_of
 from viewer.model import folder, inspection, opening
-from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.folder import filmstrip_range
 
@@ -18,7 +16,7 @@ NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 
 def state_at(name, names=NAMES):
     photos = tuple(FolderPhoto(name, float(-i)) for i, name in enumerate(names))
-    return reduce(AppState(source=Source(f"/photos/{name}", max_pixels=7)), do(folder.set_photos, "/photos", photos))
+    return folder.set_photos(AppState(source=Source(f"/photos/{name}", max_pixels=7)), "/photos", photos)
 
 
 def open_name(state):
@@ -28,58 +26,58 @@ def open_name(state):
 def test_numbers_in_names_are_counted_and_times_go_first_where_that_is_wanted():
     state = state_at("img_9.jpg")
     assert [photo.name for photo in state.folder.photos] == ["img_9.jpg", "IMG_10.jpg", "IMG_11.jpg", "Ä.png"]
-    state = reduce(state, do(folder.set_order, "time"))
+    state = folder.set_order(state, "time")
     assert [photo.name for photo in state.folder.photos] == list(reversed(NAMES))
     assert in_order((), "name") == ()
 
 
 def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends():
-    state = reduce(state_at("img_9.jpg"), do(folder.step, 1))
+    state = folder.step(state_at("img_9.jpg"), 1)
     assert (open_name(state), state.generation) == ("IMG_10.jpg", 1)
     assert state.source.max_pixels == 7
-    state = reduce(reduce(state, do(folder.step, 1)), do(folder.step, 1))
+    state = folder.step(folder.step(state, 1), 1)
     assert open_name(state) == "Ä.png"
-    assert reduce(state, do(folder.step, 1)) is reduce(state, do(folder.step, 0)) is state
-    assert open_name(reduce(state, do(folder.step, -9))) == "img_9.jpg"
+    assert folder.step(state, 1) is folder.step(state, 0) is state
+    assert open_name(folder.step(state, -9)) == "img_9.jpg"
 
 
 def test_steps_do_nothing_where_no_photo_of_the_folder_is_open():
-    other = reduce(state_at("img_9.jpg"), do(opening.open_source, Source("/other/a.jpg")))
-    other = reduce(other, do(opening.show_scene, other.generation, scene_of(source=other.source)))
+    other = opening.open_source(state_at("img_9.jpg"), Source("/other/a.jpg"))
+    other = opening.show_scene(other, other.generation, scene_of(source=other.source))
     assert other.folder is None, "the filmstrip of another folder goes"
     elsewhere = replace(state_at("img_9.jpg"), source=Source("/other/img_9.jpg"))
     for state in (AppState(), elsewhere, state_at("gone.jpg")):
-        assert reduce(state, do(folder.step, 1)) is state
+        assert folder.step(state, 1) is state
 
 
 def test_a_walk_through_a_folder_leaves_one_recent_file():
     state = replace(state_at("img_9.jpg"), recent=("/other/a.jpg", "/other/b.jpg"))
-    state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg"))))
-    state = reduce(state, do(inspection.set_overlay, "disparity"))
+    state = opening.show_scene(state, 0, scene_of(source=Source("/photos/img_9.jpg")))
+    state = inspection.set_overlay(state, "disparity")
     for _ in range(2):
-        state = reduce(state, do(folder.step, 1))
-        state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
+        state = folder.step(state, 1)
+        state = opening.show_scene(state, state.generation, scene_of(source=state.source))
     assert state.inspection.overlay == "disparity", "one may look through a folder's depth"
     opened = ("/photos/img_9.jpg", "/other/a.jpg", "/other/b.jpg")
     assert state.recent == ("/photos/IMG_11.jpg", *opened), "what was opened by name stays"
-    state = reduce(state, do(opening.open_source, Source("/photos/img_9.jpg")))
-    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=Source("/photos/img_9.jpg"))))
+    state = opening.open_source(state, Source("/photos/img_9.jpg"))
+    state = opening.show_scene(state, state.generation, scene_of(source=Source("/photos/img_9.jpg")))
     assert state.recent[:2] == ("/photos/img_9.jpg", "/photos/IMG_11.jpg")
     assert state.inspection.overlay is None
 
 
 def test_a_photo_that_does_not_open_is_told_once_and_passed_by():
     state = state_at("img_9.jpg")
-    state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg", max_pixels=7))))
-    damaged = reduce(replace(state, source=state.scene.source), do(folder.step, 1))
-    state = reduce(damaged, do(opening.report_failure, damaged.generation, "IMG_10.jpg: damaged"))
+    state = opening.show_scene(state, 0, scene_of(source=Source("/photos/img_9.jpg", max_pixels=7)))
+    damaged = folder.step(replace(state, source=state.scene.source), 1)
+    state = opening.report_failure(damaged, damaged.generation, "IMG_10.jpg: damaged")
     assert open_name(state) == "img_9.jpg"
     assert "damaged" in state.notices[-1].text
-    state = reduce(state, do(folder.step, 1))
+    state = folder.step(state, 1)
     assert open_name(state) == "IMG_11.jpg"
-    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
-    assert open_name(reduce(state, do(folder.step, -1))) == "img_9.jpg"
-    assert reduce(damaged, do(opening.stop)).folder.unreadable == frozenset()
+    state = opening.show_scene(state, state.generation, scene_of(source=state.source))
+    assert open_name(folder.step(state, -1)) == "img_9.jpg"
+    assert opening.stop(damaged).folder.unreadable == frozenset()
 
 
 @pytest.mark.parametrize(
@@ -96,5 +94,5 @@ def test_a_photo_that_does_not_open_is_told_once_and_passed_by():
 )
 def test_the_filmstrip_shows_what_lies_around_the_open_photo(place, scrolled, most, shown):
     names = tuple(f"{i}.jpg" for i in range(10))
-    state = reduce(state_at(f"{place}.jpg", names), do(folder.scroll, scrolled))
+    state = folder.scroll(state_at(f"{place}.jpg", names), scrolled)
     assert filmstrip_range(state, most) == shown

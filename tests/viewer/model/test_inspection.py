@@ -10,7 +10,6 @@ from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from viewer.model import gesture, inspection, opening
-from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
 from viewer.model.inspection import Hover, Inspection, Probe, sheet_cells, view_at, view_near
@@ -44,7 +43,7 @@ def test_opacity_and_divider_are_held_within_the_picture():
     held = inspection.move_divider(OPEN, 5)
     assert 0.9 < held.inspection.divider < 1
     assert held.inspection.divider_taken
-    assert not reduce(held, do(gesture.end_gesture)).inspection.divider_taken
+    assert not gesture.end_gesture(held).inspection.divider_taken
 
 
 @pytest.mark.parametrize("kind", ["entropy", "inpainted"])
@@ -72,7 +71,7 @@ def test_a_snapshot_is_needed_before_it_is_compared():
 def test_the_next_scene_is_looked_at_in_the_same_way_without_the_findings():
     state = inspection.take_snapshot(inspection.show_epis(OPEN, True))
     state = inspection.compare(inspection.set_hover(state, Hover(3, 4, 0.5)), "snapshot")
-    opened = reduce(state, do(opening.show_scene, 3, replace(SCENE, source=Source("b.png"))))
+    opened = opening.show_scene(state, 3, replace(SCENE, source=Source("b.png")))
     assert opened.inspection == Inspection(shows_epis=True)
 
 

@@ -16,11 +16,9 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import scene_of, state_with
 from viewer.app.picture_files import read_settings
 from viewer.model import opening
-from viewer.model.action import do
 from viewer.model.saved_settings import (
     MAX_CHARACTERS,
     left_out_note,
@@ -114,7 +112,7 @@ def test_damaged_settings_are_one_line_that_names_the_field(text, named):
     assert named in str(error.value)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 300
-    state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(settings=text or "x")))
+    state = opening.show_scene(state_with(None), 1, scene_of(settings=text or "x"))
     assert state.optics == Optics()
     assert [notice.is_error for notice in state.notices] == [True]
 
@@ -173,7 +171,7 @@ def test_numbers_of_numpy_are_written_like_any():
 def test_what_a_later_program_added_is_named_and_the_rest_counts():
     strokes = [{"tool": "nearer", "points": [[0.5, 0.25]], "radius": 0.03, "strength": 0.25, "tilt_deg": 5}]
     text = changed(film="grain", optics__bokeh={"deep": [1]}, depth_edits={"strokes": strokes}, source__a="\n" * 90)
-    state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(settings=text)))
+    state = opening.show_scene(state_with(None), 1, scene_of(settings=text))
     (notice,) = state.notices
     assert not notice.is_error
     assert notice.offer.unknown_fields == ("optics.bokeh", "source.a", "film", "depth_edits.strokes.tilt_deg")

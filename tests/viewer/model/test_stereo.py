@@ -52,6 +52,7 @@ def test_all_eyes_stay_within_the_views_and_the_picture(at, count):
 def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of():
     usual = Stereo()
     assert stereo.eye_distance(SCENE, usual) == pytest.approx(0.03 * 600 / 4)
+    assert stereo.eye_distance(SCENE, replace(usual, screen=4.0)) == pytest.approx(0.03 * 600 / 6)
     assert stereo.warning(SCENE, usual) == ""
     wide = replace(usual, eyes=8.0)
     assert stereo.warning(SCENE, wide).startswith("Parallax before the screen is 5.3 % of the width")  # 4 * 8 / 600

@@ -7,9 +7,7 @@ import pytest
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
-from tests.viewer.conftest import reduce
 from viewer.model import opening, viewpoint
-from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.layout import MAX_ZOOM, Beside, Zoom, layout_of, pixel_at
 
@@ -93,9 +91,9 @@ def test_the_picture_follows_the_hand_as_far_as_it_goes():
 
 
 def test_another_photo_is_seen_whole_and_the_same_one_as_before():
-    zoomed = reduce(STATE, do(viewpoint.set_zoom, Zoom(1.0)))
-    assert reduce(zoomed, do(opening.show_scene, zoomed.generation, replace(SCENE))).zoom == Zoom(1.0)
-    asked = reduce(zoomed, do(opening.open_source, Source("other.png")))
+    zoomed = viewpoint.set_zoom(STATE, Zoom(1.0))
+    assert opening.show_scene(zoomed, zoomed.generation, replace(SCENE)).zoom == Zoom(1.0)
+    asked = opening.open_source(zoomed, Source("other.png"))
     other = replace(SCENE, source=asked.source)
-    assert reduce(asked, do(opening.show_scene, asked.generation, other)).zoom is None
-    assert reduce(AppState(), do(viewpoint.set_zoom, Zoom(1.0))).zoom is None
+    assert opening.show_scene(asked, asked.generation, other).zoom is None
+    assert viewpoint.set_zoom(AppState(), Zoom(1.0)).zoom is None

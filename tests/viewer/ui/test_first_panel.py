@@ -7,7 +7,6 @@ import pytest
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.scenes.scene import Progress
 from iibr_core.scenes.screen_size import ScreenSize
-from tests.viewer.conftest import reduce
 from tests.viewer.ui.conftest import CONTROLS
 from viewer.model import preferences, window
 from viewer.model.action import do
@@ -65,9 +64,9 @@ def test_views_without_depth_say_whether_it_is_looked_for(first, progress, words
 
 def test_what_is_open_within_a_closed_section_opens_again_with_it():
     state = AppState(preferences=Preferences(open_sections=with_sections((), "depth")))
-    closed = reduce(state, do(preferences.toggle_section, "more"))
+    closed = preferences.toggle_section(state, "more")
     assert not is_seen_open("depth", closed.preferences.open_sections)
-    assert reduce(closed, do(preferences.toggle_section, "more")) == state
+    assert preferences.toggle_section(closed, "more") == state
 
 
 def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(first, built):
@@ -83,6 +82,6 @@ def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(f
     first.do(do(window.set_narrow, False))
     first.do(toggle.action(first.state))
     assert first.state.is_panel_hidden
-    full = reduce(AppState(hides_panel=False), do(window.set_fullscreen, True))
+    full = window.set_fullscreen(AppState(hides_panel=False), True)
     assert full.is_panel_hidden
-    assert reduce(full, do(window.set_fullscreen, False)).hides_panel is False, "as the user had it"
+    assert window.set_fullscreen(full, False).hides_panel is False, "as the user had it"

@@ -7,9 +7,7 @@ import pytest
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape
-from tests.viewer.conftest import reduce
 from viewer.model import opening, preferences, window
-from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.preferences import SECTIONS, with_sections
 from viewer.model.remedies import BETTER_DEPTH
@@ -68,7 +66,7 @@ def with_open(state, *sections):
 @pytest.mark.parametrize("section", SECTIONS)
 def test_every_section_opens_and_closes_by_its_heading(viewer, operated, built, section):
     before = with_open(viewer.state, section)
-    before = reduce(before, do(preferences.toggle_section, section))
+    before = preferences.toggle_section(before, section)
     opened = operated(before, **{f"{section.capitalize()}###section {section.capitalize()}": True})
     assert section in opened.preferences.open_sections
     operated(before)
@@ -81,8 +79,8 @@ def test_every_section_opens_and_closes_by_its_heading(viewer, operated, built, 
 
 def test_the_panel_tells_progress_drawing_notes_and_poor_depth(viewer, operated, built):
     state = with_open(viewer.state, "depth", "scene")
-    state = reduce(state, do(opening.set_progress, state.generation, Progress(4, 9, 0.3)))
-    state = reduce(state, do(window.set_report, DrawReport(3, 9, 12.0)))
+    state = opening.set_progress(state, state.generation, Progress(4, 9, 0.3))
+    state = window.set_report(state, DrawReport(3, 9, 12.0))
     poor = DepthOrigin("rough", "rough, guessed without a model", ("The photo's own depth was not used.",))
     scene = replace(state.scene, notes=("7.3 % of the map is unknown.",), depth_origin=poor)
     operated(replace(state, scene=scene))
@@ -96,6 +94,6 @@ def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(operated
         return "Drop a photo here" in built.names("text_wrapped", window="welcome")
 
     empty = AppState(recent=("old.png",))
-    asked = reduce(empty, do(opening.open_source, Source("holiday.jpg")))
-    failed = reduce(asked, do(opening.report_failure, asked.generation, "no photo"))
+    asked = opening.open_source(empty, Source("holiday.jpg"))
+    failed = opening.report_failure(asked, asked.generation, "no photo")
     assert [asks(state) for state in (empty, asked, failed)] == [True, False, True]
