@@ -8,6 +8,8 @@ import pytest
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.evaluate import Options
 from iibr_core.method.light_field import ViewMaker
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.view import Renderer, finish
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene
@@ -65,6 +67,17 @@ def test_all_stages_are_on_by_default() -> None:
     assert Options().stages == ALL_STAGES
     photo, values = scene("soft")
     np.testing.assert_array_equal(refine(photo, values), refine(photo, values, stages=Stages()))
+
+
+def test_views_are_those_that_the_transformer_decides_without_flying_pixels() -> None:
+    photo, values = scene("exact")
+    maker, at = ViewMaker(photo, values, [ViewOffset(-2, -2), ViewOffset(2, 2)]), ViewOffset(1.5, -1)
+    decided, closed_form = (Renderer(each).render(maker.rays, at) for each in (shipped_transformer(), None))
+    assert (decided.colors != closed_form.colors).any()
+    assert (decided.inpainted & (decided.disparity != closed_form.disparity)).any()
+    expected = finish(maker.rays, at, decided).colors
+    assert (expected != decided.colors).any()
+    np.testing.assert_array_equal(maker.view(at).colors, expected)
 
 
 def test_stages_are_left_out_by_name() -> None:

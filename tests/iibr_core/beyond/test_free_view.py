@@ -11,6 +11,7 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.method.rays import NO_MARGINS, rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.types import Camera, ImageSize, InputError, ViewOffset
+from tests.iibr_core.red_inpainter import paint_red
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
 
@@ -86,6 +87,8 @@ def test_holes_show_what_lies_behind_and_never_the_foreground(inpainter):
     pixels, inverse_depth = square_scene()
     pixels[:], pixels[inverse_depth > 0.5] = (0.2, 0.2, 0.8), (0.9, 0.1, 0.1)
     here, beside = camera(40, 48), [camera(40, 48, place=(x, 0.0, 0.0)) for x in (-0.2, 0.2)]
+    red = free_cameras.FreeViews(pixels, inverse_depth, here, [here, *beside], paint_red).view(beside[0])
+    assert (red.colors == (1, 0, 0)).all(axis=2).any()
     views = free_cameras.FreeViews(pixels, inverse_depth, here, [here, *beside], inpainter)
     for view in map(views.view, beside):
         holes = view.inpainted[8:32, 14:34]

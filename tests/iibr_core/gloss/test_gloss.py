@@ -90,18 +90,6 @@ def test_a_mirror_shows_the_light_itself_and_nothing_beside_it():
     assert share(mirror, UP, v, direction(45, 180)) < 0.01
 
 
-@pytest.mark.parametrize("roughness", [0.35, 1.0])
-@pytest.mark.parametrize("polar_deg", [0, 75, 88])
-def test_no_more_light_leaves_than_came(roughness, polar_deg):
-    """Over all directions of the eye, a light of irradiance 1 gives at most 1, whatever the surface."""
-    gloss = Gloss(roughness=roughness, reflectance=1.0, light=GlossLight(radius_deg=1.0))
-    disc, light, count, total = gloss.lobe[1], direction(polar_deg), 100, 0.0
-    for p, a in product((np.arange(count) + 0.5) / count * pi / 2, (np.arange(count) + 0.5) / count * pi):
-        total += share(gloss, UP, (sin(p) * cos(a), sin(p) * sin(a), cos(p)), light) * cos(p) * sin(p)
-    total *= (pi / 2 / count) * (2 * pi / count)
-    assert 0 < total / (pi * disc * cos(radians(polar_deg))) <= 1.02
-
-
 @pytest.mark.parametrize(
     ("v", "light"), [((30, 0), (91, 180)), ((91, 0), (30, 180)), ((120, 0), (120, 180)), ((0, 0), (180, 0))]
 )
@@ -127,13 +115,6 @@ def test_normals_of_a_sphere_come_close_and_the_wall_behind_it_stays_flat():
     step = (disparity.max() - disparity.min()) / 255
     apart = degrees_apart(fit_normals(np.round(disparity / step) * step, GEOMETRY), normals)
     assert np.median(apart[hit]) < 4, "also of a map in steps"
-
-
-def test_a_depth_edge_between_two_planes_bends_neither():
-    depth = np.full(SIZE, 60.0)
-    depth[:, 40:] = 30.0
-    facing = np.array([0, 0, -1], np.float32)
-    assert degrees_apart(fit_normals(disparity_of(depth), GEOMETRY), facing).max() < 0.1
 
 
 def test_rounding_from_pixel_to_pixel_does_not_show_in_the_normals_of_a_large_map():
@@ -261,7 +242,8 @@ def test_views_keep_their_kind_and_those_without_disparity_or_surface_stay(is_ma
 
 
 def test_a_smaller_light_of_the_same_strength_is_brighter_and_needs_a_direction():
-    wide = GlossLight(radius_deg=4.0)
+    wide = GlossLight((0.0, -3.0, -4.0), radius_deg=4.0)
+    assert wide.unit_direction == pytest.approx((0, -0.6, -0.8))
     assert replace(wide, radius_deg=2.0).radiance[0] == pytest.approx(4 * wide.radiance[0], rel=0.01)
     with pytest.raises(ValueError, match="direction"):
         GlossLight(direction=(0.0, 0.0, 0.0))

@@ -125,8 +125,9 @@ def test_large_is_where_a_square_fits():
 def test_errors_are_one_line_that_names_the_folder(folder, tmp_path):
     with pytest.raises(InputError, match="no such folder"):
         load_inpainter(f"diffusion:{tmp_path / 'none'}")
-    with pytest.raises(InputError, match=r"diffusion: .*diffusion:FOLDER"):
-        load_inpainter("diffusion")
+    for typed in ("diffusion", "diffusion:", "background:folder", "magic"):
+        with pytest.raises(InputError, match=rf"{typed}: .*background or diffusion:FOLDER"):
+            load_inpainter(typed)
     (tmp_path / "empty").mkdir()
     other = tmp_path / "other"
     shutil.copytree(folder, other)

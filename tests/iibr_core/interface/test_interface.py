@@ -13,11 +13,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.interface.fields import LensViews
 from iibr_core.method.plan import plan_literal
-from iibr_core.method.view import View as MadeView
-from iibr_core.scenes.scene import Scene as OpenScene
-from iibr_core.scenes.scene import Source
 from iibr_core.types import Disparity, GridShape, InputError, Photo
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import generate, square_before_wall
@@ -69,13 +65,6 @@ def test_literal_parallax_is_the_disparity_that_was_given() -> None:
     np.testing.assert_array_equal(field.disparity[0, 1], values)
 
 
-def test_viewing_parallax_does_not_depend_on_the_unit() -> None:
-    pixels, values = square_scene()
-    one, other = (iibr.from_arrays(pixels, values * unit).light_field(3) for unit in (1.0, 256.0))
-    np.testing.assert_array_equal(one.views, other.views)
-    assert np.ptp(one.disparity[1, 1]) * 2 == pytest.approx(0.04 * 80, rel=0.01)
-
-
 def test_a_view_between_is_what_a_denser_field_has_there() -> None:
     pixels, values = square_scene()
     scene = iibr.from_arrays(pixels, values)
@@ -120,40 +109,6 @@ def test_refocusing_is_the_mean_of_the_views_inside_the_aperture() -> None:
             cameras += 1
     expected, drawn = srgb_from_linear(total / cameras), field.refocus(2.0, 1.5)
     assert iibr.compare(drawn[8:-8, 8:-8], expected[8:-8, 8:-8].astype(np.float32)).psnr_db > 38
-
-
-@pytest.mark.parametrize(
-    ("disparity", "options", "count"),
-    [
-        (None, {"aperture": 1.0}, 256),
-        (6.0, {"aperture": 0.5}, 16),
-        (6.0, {"aperture": 2.0}, 40),
-        (6.0, {"aperture": 9.0}, 180),
-        (6.0, {"aperture": 2.0, "tilt": (1.0, -2.0)}, 64),
-        (99.0, {"aperture": 2.0}, 256),
-        (99.0, {"aperture": 2.0, "cameras": 40}, 40),
-    ],
-)
-def test_a_wider_blur_takes_more_views(disparity, options, count):
-    """4 for each pixel of blur of the middle view, 16 to 256, or as many as asked for; also beyond the grid."""
-    made = []
-
-    def view(offset):
-        made.append(offset)
-        grey = np.full((4, 4, 3), 0.5, np.float32)
-        return MadeView(grey, grey[..., 0], np.zeros((4, 4), bool), np.zeros((4, 4), bool))
-
-    views = np.zeros((3, 3, 4, 4, 3), np.uint8)
-    known = None if disparity is None else np.zeros((3, 3, 4, 4), np.float32)
-    if known is not None:
-        known[1, 1, 2, 2] = disparity
-    scene = OpenScene(Source(""), "a", 4, 4, GridShape(3, 3), (0.0, disparity or 0.0), "")
-    lens = LensViews(scene, lambda focus, reach: view)
-    field = iibr.LightField(views, known, None, 4.0, _lens=lens)
-    np.testing.assert_allclose(field.refocus(1.0, **options), 0.5, atol=1e-3)
-    assert count - 2 <= len(made) <= count
-    radius = options["aperture"] / 2
-    assert 0.8 * radius < np.hypot(*np.array(made).T).max() <= radius * 1.001
 
 
 def test_refocusing_reports_progress_and_stops():
@@ -273,7 +228,8 @@ def test_stopping_raises_cancelled(tmp_path) -> None:
         iibr.open(tmp_path / "field").light_field(5, should_stop=lambda: made > 3, report_progress=count)
 
 
-def test_depth_is_estimated_by_contours_alone() -> None:
+def test_depth_is_estimated_by_contours_alone_and_photos_are_read_smaller(photo_folder) -> None:
+    assert iibr.open(photo_folder / "photo.png", max_pixels=1200).photo.shape == (30, 40, 3)
     pixels, _ = square_scene()
     guess = iibr.estimate_depth(pixels, "guess")
     assert guess.shape == (60, 80)

@@ -30,15 +30,6 @@ def edge_photo(share):
     return colors, disparity.astype(np.float32)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.35, 0.5, 0.8])
-def test_a_mixed_pixel_splits_into_its_surfaces(share):
-    own, fringe, fringe_disparity, coverage = split_mixed_pixels(*edge_photo(share), edge_step=0.5)
-    assert coverage[4, 5] == pytest.approx(share, abs=2e-3)
-    assert own[4, 5] == pytest.approx(BACK, abs=6e-3)
-    assert fringe[4, 5] == pytest.approx(FOREGROUND, abs=2e-3)
-    assert fringe_disparity[4, 5] == 2.0
-
-
 def shares_of(scale, turn=0):
     """Return the shares of a photo of greys, times a scale for each channel, which are turned round."""
     colors, disparity = edge_photo(0.35)
@@ -131,14 +122,6 @@ def test_pixels_behind_an_edge_are_split_but_not_on_a_slope(behind, beside, is_s
 
 
 STEPS = (0.1, 1.0)
-
-
-def moved(row, steps=STEPS):
-    """Return what becomes of a row of a picture, and ask for the same of a column."""
-    values = np.tile(np.float32(row), (3, 1))
-    found = move_with_foreground(values, steps)
-    np.testing.assert_array_equal(move_with_foreground(np.ascontiguousarray(values.T), steps), found.T)
-    return found[1].tolist()
 
 
 def test_pixels_move_as_the_slow_way_says():

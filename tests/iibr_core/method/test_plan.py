@@ -1,4 +1,4 @@
-from itertools import product
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from iibr_core.method.farthest_views import (
     MAX_MARGIN,
     farthest_views,
     outer_views,
-    outer_views_of_grid,
     outpainting_margins,
 )
 from iibr_core.method.memory import scene_bytes
@@ -58,12 +57,9 @@ def test_literal_takes_disparity_as_it_is():
     assert 0 < plan.edge_fraction < 0.5
     wide = plan_literal(*square_before_wall(foreground=20.0), GridShape(3, 3))
     assert "moves 40 px against the farthest" in wide.notes[0]
-
-
-@pytest.mark.parametrize(("step_px", "is_edge"), [(1.4, False), (1.6, True)])
-def test_depth_edges_are_steps_of_one_and_a_half_pixels_in_the_outermost_view(step_px, is_edge):
-    photo, disparity = square_before_wall(foreground=step_px / 2)
-    assert (plan_literal(photo, disparity, GridShape(5, 3)).edge_fraction > 0) == is_edge
+    for empty in (GridShape(0, 3), GridShape(3, 0)):
+        with pytest.raises(InputError, match="give at least one view each way"):
+            plan_literal(photo, disparity, empty)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -78,6 +74,7 @@ def test_pixels_at_a_step_up_or_down_either_way_count(axis, sign):
 def test_less_memory_gives_fewer_views(monkeypatch):
     photo, disparity = square_before_wall(300, 800)
     roomy = plan_for_viewing(photo, disparity)
+    assert plan_for_viewing(replace(photo, is_hdr=True), disparity).field_bytes > roomy.field_bytes
     needed = scene_bytes(300 * 800, roomy.field_bytes)
     monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * needed)
     assert plan_for_viewing(photo, disparity).grid == roomy.grid, "just enough"
@@ -167,6 +164,8 @@ def test_planes_and_slats_have_no_noise_and_keep_their_range():
     slats = np.tile(np.float32([0, 0, 0, 3, 3, 3]), (HEIGHT, WIDTH // 6))
     for values in (slats, np.ascontiguousarray(slats.T)):
         assert measure_disparity_range(values) == DisparityRange(0.0, 3.0, 0.0)
+    slats[7, 9] = np.nan
+    assert measure_disparity_range(slats) == DisparityRange(0.0, 3.0, 0.0)
     for shape in ((1, 1), (1, 9), (2, 2), (2, 400)):
         assert measure_disparity_range(np.full(shape, 7.0, np.float32)) == DisparityRange(7.0, 7.0, 0.0)
 
@@ -190,16 +189,6 @@ def test_they_are_the_corners_around_all_viewpoints_opposite_ones_in_pairs():
     assert outer_views([]) == []
     assert outer_views([ViewOffset(0.0, 2.0)]) == [(0, 2)]
     assert farthest_views([]) == farthest_views([ViewOffset(0.0, -0.5)]) == 1
-
-
-@pytest.mark.parametrize("grid", [GridShape(*at) for at in product((1, 2, 3, 4, 9), repeat=2)], ids=str)
-def test_those_of_a_grid_are_views_of_it_each_once_and_never_the_photo_s(grid):
-    bottom, right = grid.rows - 1, grid.columns - 1
-    indices = dict.fromkeys([(0, 0), (bottom, right), (0, right), (bottom, 0)])
-    expected = [grid.offset(*index) for index in indices if index != grid.centre]
-    every = [grid.offset(*index) for index in np.ndindex(*grid)]
-    assert outer_views_of_grid(grid) == outer_views(every) == expected
-    assert farthest_views(expected) == max(1.0, *(abs(part) for offset in every for part in offset))
 
 
 @pytest.mark.parametrize("disparity", [1.5, -1.5])

@@ -27,7 +27,7 @@ from iibr_core.training.degradation import degrade
 from iibr_core.training.model import RayTransformer
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import cast, render
-from iibr_core.types import ImageSize, ViewOffset
+from iibr_core.types import ImageSize, InputError, ViewOffset
 
 SIZE, RADIUS = ImageSize(96, 128), 4
 SEEDS = range(1_000_007, 1_000_011)
@@ -130,6 +130,9 @@ def weights_of(model, ambiguous, order=slice(None)):
 @pytest.mark.parametrize("rays", [1, 63, 64, 200])
 def test_compiled_weights_are_those_of_the_model_and_sum_to_one(model, compiled, tmp_path, rays):
     ambiguous = random_ambiguous(rays)
+    save_weights(RayTransformer(width=8), tmp_path / "narrow.safetensors")
+    with pytest.raises(InputError, match="narrow"):
+        TrainedWeights(tmp_path / "narrow.safetensors")
     weights = compiled(ambiguous)
     assert weights == pytest.approx(weights_of(model, ambiguous), abs=1e-5)
     for factor in (1e30, -1.0):

@@ -6,9 +6,6 @@ from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import ImageSize, Margins, ViewOffset
-from tests.iibr_core.method.ray_sets import filled_rays
-from tests.iibr_core.red_inpainter import paint_red
-from tests.iibr_core.scenes import square_before_wall
 
 FARTHEST, CENTRE = 2.0, ViewOffset(0.0, 0.0)
 SURFACE_STEP = SAME_SURFACE_PX / FARTHEST
@@ -105,38 +102,6 @@ def test_what_was_filled_in_a_view_joins_within_the_margins_with_what_lies_behin
 
 
 LEFT, RIGHT = ViewOffset(0.0, -2.0), ViewOffset(0.0, 2.0)
-
-
-@pytest.fixture
-def rays():
-    photo, disparity = square_before_wall(30, 40, 3.0)
-    return rays_of_photo(photo.pixels, disparity.values, 2.0, 2)
-
-
-def test_what_a_view_disoccluded_has_joined_the_rays_when_it_is_yielded(rays):
-    photo_images, renderer = len(rays), Renderer()
-    expected = renderer.render(rays, LEFT)
-    for count, (offset, view) in enumerate(update(rays, [LEFT, RIGHT], renderer), 1):
-        assert len(rays) == photo_images + count
-        if offset == LEFT:
-            np.testing.assert_array_equal(view.colors, expected.colors)
-            added = rays.arrays.colors[-1], rays.arrays.disparity[-1], rays.arrays.coverage[-1]
-            for one, filled in zip(added, filled_rays(view)):
-                np.testing.assert_array_equal(one, filled)
-            assert (added[2] > 0)[view.occluded].all()
-    again = renderer.render(rays, LEFT)
-    assert expected.occluded.any()
-    assert not again.occluded.any(), "a hole that was inpainted is none any more"
-    assert again.inpainted[expected.occluded].all()
-
-
-def test_the_inpainter_decides_what_joins(rays):
-    ((_, view),) = update(rays, [LEFT], Renderer(inpaint=paint_red))
-    colors, disparity, filled = filled_rays(view)
-    assert (filled[view.occluded] == 1).all()
-    assert (colors[filled == 1] == (1, 0, 0)).all()
-    assert (disparity[filled == 1] == -9).all()
-    np.testing.assert_array_equal(rays.arrays.disparity[-1] == -9, filled)
 
 
 def test_what_was_inpainted_farther_back_does_not_show_through_a_hole_in_the_photos_surface():

@@ -16,7 +16,7 @@ from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import in_bands, in_pieces, side_by_side
+from iibr_core.runtime.tiling import in_pieces, side_by_side
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable
 from iibr_core.types import ImageSize, Photo, ViewOffset
 
@@ -98,14 +98,6 @@ def test_nothing_is_begun_after_the_word(threads):
         in_pieces(work, range(1000), threads)
     assert sorted(began)[:6] == list(range(6))
     assert len(began) < 6 + threads
-
-
-@pytest.mark.parametrize("size", [(1, 1), (5, 1), (1, 5), (17, 4), (100, 3), (0, 4), (4, 0), (0, 0)])
-@pytest.mark.parametrize(("most", "threads"), [(1, 1), (8, 2), (8, 5), (1000, 1), (1000, 5)])
-def test_every_row_is_in_one_band(size, most, threads):
-    found = in_bands(lambda first, last: (first, last), ImageSize(*size), threads=threads, most_pixels=most)
-    assert [row for first, last in found for row in range(first, last)] == list(range(size[0]))
-    assert all(first < last and ((last - first) * size[1] <= most or last - first == 1) for first, last in found)
 
 
 @pytest.mark.parametrize("threads", [1, 3])

@@ -95,20 +95,6 @@ def test_epi_lines_are_straight(largest):
     assert tracked > 2 * 3 * 48 * 64 * 0.3
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 17), (31, 37)])
-@pytest.mark.parametrize("largest", [0.0, 1.0, 1e4])
-def test_every_size_and_range_is_finite_and_within_its_range(size, largest):
-    for seed in range(3):
-        scene = random_scene(np.random.default_rng(seed), ImageSize(*size), largest)
-        for offset in (CENTRE, ViewOffset(4.0, -4.0)):
-            colors, disparity = render(scene, ImageSize(*size), offset)
-            assert colors.shape == (*size, 3)
-            assert np.isfinite(colors).all()
-            assert (colors >= 0).all()
-            assert (colors <= 1 + 1e-6).all()
-            assert (np.abs(disparity) <= largest * (1 + 1e-5) + 1e-9).all()
-
-
 def rough(shape=(31, 37), seed=0):
     return np.random.default_rng(seed).normal(0, 2, shape).astype(np.float32)
 
