@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_shape import openness
+from iibr_core.beyond.aperture_shape import openness, reach_of
 from iibr_core.beyond.optics import ApertureShape
 from iibr_core.types import GridShape, ViewOffset
 
@@ -53,7 +53,7 @@ def aperture_points(shape: ApertureShape, diameter: float, widest: float, count:
     if (spread := float(np.mean(points**2))) > 0:
         points *= math.sqrt(moment / spread)
     # Scaled points stay in the circle around the opening: there may be no views outside it.
-    beyond = np.hypot(*(points + centre).T) / (_reach(shape, cut) / 2)
+    beyond = np.hypot(*(points + centre).T) / (reach_of(shape, cut) / 2)
     return np.asarray(diameter * (points + centre) / np.maximum(beyond, 1.0)[:, None])
 
 
@@ -91,21 +91,16 @@ def _open_spiral(shape: ApertureShape, cut: float, count: int) -> Points:
 
     Grey parts of a mask hold a share of their points.
     """
-    numbers, reach = np.arange(count), _reach(shape, cut)
+    numbers, reach = np.arange(count), reach_of(shape, cut)
     radius, angle = reach / 2 * np.sqrt((numbers + 0.5) / max(count, 1)), GOLDEN_ANGLE * numbers
     t, s = radius * np.sin(angle), radius * np.cos(angle)
     thresholds = fractions(0, count, SQRT_STEPS[2:3])[:, 0]
     return np.stack([t, s], axis=-1)[openness(shape, t, s, 1.0, cut, reach / GRID_SIDE) > thresholds]
 
 
-def _reach(shape: ApertureShape, cut: float) -> float:
-    """Return the diameter of the circle around the opening, which includes a mask's corners, for a diameter of 1."""
-    return math.sqrt(2) * min(cut, 1.0) if shape.kind == "mask" else min(math.sqrt(2) * cut, 1.0)
-
-
 def _samples(shape: ApertureShape, cut: float, side: int) -> tuple[Points, Points]:
     """Return a grid of points (N, 2) of an opening of diameter 1, and how open it is there (N,)."""
-    reach = _reach(shape, cut)
+    reach = reach_of(shape, cut)
     places = reach * ((np.arange(side) + 0.5) / side - 0.5)
     t, s = (axis.ravel() for axis in np.meshgrid(places, places, indexing="ij"))
     return np.stack([t, s], axis=-1), openness(shape, t, s, 1.0, cut, reach / side)

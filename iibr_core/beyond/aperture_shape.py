@@ -22,6 +22,13 @@ def openness(shape: ApertureShape, t: Doubles, s: Doubles, diameter: float, wide
     return np.minimum(opening(shape, t, s, diameter, width), np.clip(within, 0, 1))
 
 
+def reach_of(shape: ApertureShape, cut: float = 1.0) -> float:
+    """Return the diameter of the circle around an opening of diameter 1, cut off to a square `cut` across; it includes
+    a mask's corners.
+    """
+    return math.sqrt(2) * min(cut, 1.0) if shape.kind == "mask" else min(math.sqrt(2) * cut, 1.0)
+
+
 def opening(shape: ApertureShape, t: Doubles, s: Doubles, diameter: float, width: float) -> Doubles:
     """Return the share 0..1 of each sample that passes the opening.
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_shape import opening
+from iibr_core.beyond.aperture_shape import opening, reach_of
 from iibr_core.beyond.optics import ApertureShape
 
 Doubles = NDArray[np.float64]
@@ -106,7 +106,7 @@ def disc_taps(shape: ApertureShape, diameter: float, is_reduced: bool) -> Double
     """Return the samples of a disc, see `Slice.taps`. diameter: in pixels of the size at which it is drawn."""
     if abs(diameter) < SHARP_PX:
         return np.array([[0.0, 0.0, 1.0]])
-    half = 2 * (int(np.ceil(abs(diameter) * _reach(shape) / 2 + 1.5)) // 2 + 1)
+    half = 2 * (int(np.ceil(abs(diameter) * reach_of(shape) / 2 + 1.5)) // 2 + 1)
     fine = (np.arange(2 * half * SUBSAMPLES) + 0.5) / SUBSAMPLES - half - 0.5
     t, s = np.meshgrid(fine / diameter, fine / diameter, indexing="ij")
     covered = opening(shape, t, s, 1.0, 1 / (SUBSAMPLES * abs(diameter)))
@@ -134,8 +134,3 @@ def _bilinear_taps(kernel: Doubles) -> Doubles:
     row, column = at = np.nonzero(np.abs(weight) > MIN_TAP)
     x, y = cells[:, :, :, 1].sum(axis=1)[at] / weight[at], cells[:, 1].sum(axis=2)[at] / weight[at]
     return np.stack([2 * column - half + x, 2 * row - half + y, weight[at]], axis=1)
-
-
-def _reach(shape: ApertureShape) -> float:
-    """Return the diameter of the circle around an opening of diameter 1."""
-    return 2**0.5 if shape.kind == "mask" else 1.0

@@ -165,10 +165,7 @@ def encode_for_storage(encoded: FloatImage, is_hdr: bool, threads: int | None = 
 def nearest_first(remaining: list[ViewOffset], nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewOffset]:
     """Yield each time the view nearest to where the user looks then, the first of equals. The list is used up."""
     while remaining:
-        nearest = min(remaining, key=partial(_square_distance, nearest_to()))
+        eye = nearest_to()
+        nearest = min(remaining, key=lambda at: (at.t - eye.t) ** 2 + (at.s - eye.s) ** 2)
         remaining.remove(nearest)
         yield nearest
-
-
-def _square_distance(one: ViewOffset, other: ViewOffset) -> float:
-    return (other.t - one.t) ** 2 + (other.s - one.s) ** 2
