@@ -62,8 +62,12 @@ def test_a_photo_is_written_with_another_number_of_views(source, tmp_path) -> No
         assert difference.mean() < 0.5, "the outermost views stay where they are"
         np.testing.assert_allclose(2 * many["disparity"][2, 2], few["disparity"][1, 1], rtol=1e-5)
         assert many["offsets"][0, 4].tolist() == [-2.0, 2.0]
+    low_high = source.with_grid(GridShape(5, 5)).scene.disparity_range_px
+    assert np.multiply(2, low_high) == pytest.approx(source.scene.disparity_range_px)
     folder = exported(source, "hci", tmp_path / "hci", grid=GridShape(2, 2))
     assert len(list(folder.glob("input_Cam*.png"))) == 4
+    for path in folder.glob("disp_Cam*"):
+        path.unlink()
     kind, given = EXPORTS["npz"], Source(str(folder))
     opened = open_for_export(kind, ExportOptions(), given, 1.0, LensChoice(), lambda scene: None, None)
     with np.load(exported(opened, "npz", tmp_path / "copy.npz")) as copied:

@@ -10,7 +10,8 @@ from PIL import Image
 from plyfile import PlyData
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.exports.cameras import cameras_of
+from iibr_core.color import stored_from_encoded
+from iibr_core.exports.cameras import cameras_of, colors_of
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.maps.pfm import read_pfm
@@ -123,6 +124,11 @@ def test_a_picture_with_its_depth_beside_it(source, tmp_path, layout, picture, d
     low, high = source.scene.disparity_range_px
     expected = 255 * (source.centre_view().disparity - low) / (high - low)
     assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
+
+
+def test_bright_views_are_written_as_bytes() -> None:
+    encoded = np.random.default_rng(0).random((4, 5, 3), np.float32)
+    assert np.abs(colors_of(ViewUpdate(0, 0, stored_from_encoded(encoded, True), None)) - 255 * encoded).max() <= 1
 
 
 def test_epi_has_a_line_a_view(source, tmp_path) -> None:

@@ -149,7 +149,8 @@ def test_the_field_is_described_and_the_first_picture_is_the_middle(opened) -> N
     letters = re.search(r'src="data:image/avif;base64,([^"]*)"', text)
     with Image.open(BytesIO(base64.b64decode(letters[1]))) as image:
         first = np.asarray(image.convert("RGB")).astype(int)
-    assert np.abs(first - next(opened.views()).colors).mean() < 4
+    differences = [np.abs(first - view.colors).mean() for view in opened.views()]
+    assert differences[0] == min(differences) < 4
 
 
 def test_the_page_opens_with_the_lens_that_is_chosen(opened):

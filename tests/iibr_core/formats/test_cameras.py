@@ -40,6 +40,7 @@ def test_cropped_views_have_their_principal_points_in_the_middle_to_half_a_pixel
     cameras = whole.centred(offsets)
     assert cameras.size == (60, 92)
     assert 0.29 < cameras.off_centre_px(offsets) < 0.31 < whole.off_centre_px(offsets)
+    assert whole.off_centre_px([ViewOffset(0, 1)]) == pytest.approx(2.3)
     for offset in offsets:
         rows, columns = cameras.window(offset)
         assert 0 <= rows.start < rows.stop <= 64
@@ -47,7 +48,8 @@ def test_cropped_views_have_their_principal_points_in_the_middle_to_half_a_pixel
         x, y = cameras.principal_point(offset)
         assert (x + columns.start, y + rows.start) == pytest.approx(whole.principal_point(offset))
     assert FieldCameras(GRID, SIZE, 80.0, (1.0, 2.5), 0.0).centred(offsets).size == SIZE
-    assert FieldCameras(GRID, SIZE, 80.0, (-8.0, 2.5), -9.0).centred(offsets).margins is None
+    far = FieldCameras(GRID, SIZE, 80.0, (-8.0, 2.5), -9.0).centred(offsets)
+    assert (far.margins, far.window(offsets[0])) == (None, (slice(0, 64), slice(0, 96)))
 
 
 @pytest.mark.parametrize(

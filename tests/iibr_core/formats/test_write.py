@@ -31,6 +31,7 @@ EXPOSURE, FOCAL, FOCAL_35, MAKER_NOTE, WIDTH, PER_UNIT = 0x829A, 0x920A, 0xA405,
 XMP = b"""<?xpacket begin='' id='W5M0MpCehiHzreSzNTczkc9d'?><x:xmpmeta xmlns:x='adobe:ns:meta/'>
 <rdf:RDF xmlns:rdf='http://www.w3.org/1999/02/22-rdf-syntax-ns#'><rdf:Description rdf:about=''
  xmlns:dc='http://purl.org/dc/elements/1.1/' xmlns:xmp='http://ns.adobe.com/xap/1.0/' xmp:Rating='4'
+ xmp:Thumbnails='old'
  xmlns:GDepth='http://ns.google.com/photos/1.0/depthmap/' GDepth:Near='0.3' GDepth:Format='RangeInverse'
  xmlns:exif='http://ns.adobe.com/exif/1.0/' exif:GPSLatitude='48,51.4N'
  xmlns:crs='http://ns.adobe.com/camera-raw-settings/1.0/' crs:Exposure2012='+1.00'>
@@ -143,7 +144,7 @@ def test_exif_and_xmp_are_kept(tmp_path, source, ending):
         xmp = xmp if isinstance(xmp, str) else xmp.decode()
         assert "A &amp; B" in xmp
         assert 'xmp:Rating="4"' in xmp
-        for gone in ("GDepth", "GPS", "Exposure2012"):
+        for gone in ("GDepth", "GPS", "Exposure2012", "Thumbnails"):
             assert gone not in xmp
     assert settings_text_in(saved) == SETTINGS
     assert caption_in(read_metadata(saved)).title == "A & B"
