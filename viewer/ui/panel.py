@@ -27,7 +27,7 @@ from viewer.ui.sections import (
     stereo_section,
     view_section,
 )
-from viewer.ui.widgets import button, gap, heading, in_row, label, last_part, lines, quiet, scale, tooltip
+from viewer.ui.widgets import FIXED, button, gap, heading, in_row, label, last_part, lines, quiet, scale, tooltip
 
 TOOLS = (
     (f"{icons.ICON_FA_IMAGE}  Open", "Open a photo…"),
@@ -51,15 +51,6 @@ HINT = "Drag the picture to look around it, click to focus."
 FLAT_HINT = "All of it is equally far away, so nothing moves."
 CANCEL = "Cancel"
 CANCEL_TIP = "Stop here: the picture stays as it is now, and moves less smoothly."
-_FIXED = (
-    imgui.WindowFlags_.no_title_bar
-    | imgui.WindowFlags_.no_resize
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_collapse
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.no_bring_to_front_on_focus
-)
 
 
 def panel(state: AppState, layout: Layout) -> list[Action]:
@@ -69,7 +60,7 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
         return []
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
-    imgui.begin("panel", None, _FIXED)
+    imgui.begin("panel", None, FIXED)
     is_empty = state.scene is None and not progress_text(state.progress)  # the start page has all that can be done
     actions = _tools(START_TOOLS if is_empty else TOOLS, state)
     if state.scene is not None:

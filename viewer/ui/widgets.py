@@ -21,6 +21,16 @@ LABEL_WIDTH = 104.0
 SPACING = 4.0
 """Distance of buttons in a row at usual size, in window units."""
 TOOLTIP_WIDTH = 260.0
+FIXED = (
+    imgui.WindowFlags_.no_title_bar
+    | imgui.WindowFlags_.no_resize
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_collapse
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+)
+"""Flags of a window that has its place beside the picture."""
 TRACK_HEIGHT = 3.0
 """Height of a slider's track at usual size, in window units."""
 

@@ -17,8 +17,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator
-from viewer.gpu.refocus.passes import ProgressiveAccumulation
+from viewer.gpu.refocus.passes import Passes, ProgressiveAccumulation
 from viewer.gpu.render_targets import PictureTargets
 
 STEP_S = 0.005
@@ -81,7 +80,7 @@ class PictureDrawing:
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
         self.is_done = self._is_released = self._is_in_steps = False
         self._gl = gl
-        self._accumulator = Accumulator(gl.ctx, programs)
+        self._passes = Passes(gl.ctx, programs)
         self._whole = replace(whole, field=whole.field.share())
         self._is_linear, self._color_space = is_linear, color_space
         max_px = MAX_OPEN_TILE_PX if whole.lens.slices else gl.max_texture_size
@@ -121,7 +120,7 @@ class PictureDrawing:
         if not self._is_released:
             self._is_released = True
             self._steps.close()
-            self._accumulator.release()
+            self._passes.release()
             self._whole.field.release()
 
     def _draw(self) -> Generator[None]:
@@ -142,10 +141,10 @@ class PictureDrawing:
         if lens.slices:
             pinhole = PictureTargets(self._gl.ctx, accumulation.drawn_px, "f4")
             stack.callback(pinhole.release)
-            yield from self._accumulator.sum_up_in_steps(accumulation, pinhole.light.framebuffer, pixels)
-            yield from self._accumulator.open_lens(accumulation, pinhole, targets.light.framebuffer)
+            yield from self._passes.sum_up_in_steps(accumulation, pinhole.light.framebuffer, pixels)
+            yield from self._passes.open_lens(accumulation, pinhole, targets.light.framebuffer)
         else:
-            yield from self._accumulator.sum_up_in_steps(accumulation, targets.light.framebuffer, pixels)
-        self._accumulator.passes.present(lens, targets, self._is_linear, self._color_space)
+            yield from self._passes.sum_up_in_steps(accumulation, targets.light.framebuffer, pixels)
+        self._passes.present(lens, targets, self._is_linear, self._color_space)
         yield
         self.image[tile.rows, tile.columns] = targets.image.read()

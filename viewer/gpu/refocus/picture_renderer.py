@@ -25,7 +25,6 @@ from iibr_core.types import GridShape
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator
 from viewer.gpu.refocus.frame_budget import (
     OPEN_FETCHES,
     FrameTimeModel,
@@ -34,7 +33,7 @@ from viewer.gpu.refocus.frame_budget import (
     scale_size,
     stretch_image,
 )
-from viewer.gpu.refocus.passes import ProgressiveAccumulation
+from viewer.gpu.refocus.passes import Passes, ProgressiveAccumulation
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.render_targets import PictureTargets, TargetCache
@@ -55,7 +54,7 @@ class Renderer:
         self.passes_shown = self.samples = self.samples_converged = 0
         self.draw_s = 0.0
         self._owns_programs, self.programs = programs is None, programs or ProgramCache(self.ctx)
-        self._accumulator = Accumulator(self.ctx, self.programs)
+        self._passes = Passes(self.ctx, self.programs)
         self._pinhole: PictureTargets | None = None
         self._opening: Iterator[None] | None = None
         self._targets = TargetCache(self.ctx)
@@ -200,7 +199,7 @@ class Renderer:
 
     def present(self, framebuffer: moderngl.Framebuffer) -> None:
         """Write the shown image into the viewport of a framebuffer, which has the size `shown_px`."""
-        self._accumulator.passes.present(self._current.lens, self._shown, into=framebuffer)
+        self._passes.present(self._current.lens, self._shown, into=framebuffer)
 
     @property
     def shown_px(self) -> ScreenSize:
@@ -223,7 +222,7 @@ class Renderer:
         """Free every GL object but the field."""
         if self._owns_programs:
             self.programs.release()
-        self._accumulator.release()
+        self._passes.release()
         if self._pinhole is not None:
             self._pinhole.release()
         self._targets.release()
@@ -267,7 +266,7 @@ class Renderer:
             target = self._pinhole_targets(accumulation.drawn_px).light.framebuffer
         else:
             target = self._targets.get(accumulation.size_px).light.framebuffer
-        self._accumulator.sum_up(accumulation, target, passes, budget_s, sample_s)
+        self._passes.sum_up(accumulation, target, passes, budget_s, sample_s)
 
     def _pinhole_targets(self, size_px: ScreenSize) -> PictureTargets:
         if self._pinhole is None or self._pinhole.size_px != size_px:
@@ -283,7 +282,7 @@ class Renderer:
             return
         if self._opening is None:
             pinhole, target = self._pinhole_targets(accumulation.drawn_px), self._targets.get(accumulation.size_px)
-            self._opening = self._accumulator.open_lens(accumulation, pinhole, target.light.framebuffer)
+            self._opening = self._passes.open_lens(accumulation, pinhole, target.light.framebuffer)
         for _ in self._opening:
             if budget_s < math.inf:
                 self.ctx.finish()
@@ -294,7 +293,7 @@ class Renderer:
     def _finish(self) -> None:
         self._targets.shown = targets = self._targets.get(self._current.size_px)
         if self._owns_programs:
-            self._accumulator.passes.present(self._current.lens, targets)
+            self._passes.present(self._current.lens, targets)
         self.passes_shown = self._passes_ready
 
     def _fetches(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> float:

@@ -14,7 +14,7 @@ from viewer.model.app_state import AppState
 from viewer.model.folder import Thumbnail
 from viewer.model.layout import Layout
 from viewer.ui.style import Palette, corners, pack_color, palette_of
-from viewer.ui.widgets import scale, tooltip
+from viewer.ui.widgets import FIXED, scale, tooltip
 
 CELL_ASPECT = 1.5
 GAP = 6.0
@@ -22,13 +22,6 @@ COPY_LOOK, PASTE_LOOK = "Copy the look of the open photo", "Paste the look to th
 """Entries of a photo's menu."""
 WORDS_SIZE = 0.85
 """Size of words in a cell relative to the usual text."""
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.no_bring_to_front_on_focus
-)
 
 
 def filmstrip_paths(state: AppState, layout: Layout) -> tuple[str, ...]:
@@ -51,7 +44,7 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
-    imgui.begin("filmstrip", None, _FLAGS)
+    imgui.begin("filmstrip", None, FIXED | imgui.WindowFlags_.no_scrollbar)
     actions: list[Action] = []
     shown, place = folder.filmstrip_range(state, _count(rect, layout)), folder.place_of_photo(photos, state.source)
     palette = palette_of(state.preferences.theme)
