@@ -92,6 +92,16 @@ def rests(app):
     return app.wait_s == main_loop.IDLE_WAIT_S
 
 
+def says(words):
+    """The condition that a notice has these words."""
+    return lambda app: any(words in notice.text for notice in app.state.notices)
+
+
+def shows(name):
+    """The condition that this photo is open."""
+    return lambda app: app.state.scene is not None and app.state.scene.name == name
+
+
 def has_all_views(state):
     """Whether all views are there, made with the newest settings: progress is that of the views before until then."""
     return state.progress.is_complete and state.shown_generation == state.generation
@@ -120,10 +130,18 @@ class Driver:
         self.until(condition)
         self.until_idle()
 
-    def do(self, *actions):
-        """Do something that no hand does, and turn the loop until nothing is left to do."""
+    def do(self, *actions, until=None, settle=None):
+        """Do something that no hand does, and turn the loop until nothing is left to do, or a condition holds."""
         self.app.do(*actions)
-        self.until_idle()
+        if until is None and settle is None:
+            self.until_idle()
+        self._wait(until, settle)
+
+    def _wait(self, until, settle):
+        if until is not None:
+            self.until(until)
+        if settle is not None:
+            self.settle(settle)
 
     def send(self, *words):
         """Let xdotool do something."""
@@ -173,11 +191,39 @@ class Driver:
         top, bottom = (pick(corner.y for corner in corners) for pick in (min, max))
         return round((left + right) / 2), round((top + bottom) / 2)
 
-    def press(self, widget, window="panel"):
-        """Click a widget."""
+    def open_sections(self, *sections):
+        """Have these sections of the panel open, with those that they lie in, and no others."""
+        from viewer.model.preferences import with_sections
+
+        preferences = replace(self.app.state.preferences, open_sections=with_sections((), *sections))
+        self.app.state = replace(self.app.state, preferences=preferences)
+
+    def drop(self, path, until=None, settle=None):
+        """Drop a file on the window, and turn the loop until what that leads to."""
+        self.app.window.on_drop(None, [str(path)])
+        self._wait(until, settle)
+
+    def key(self, keys, until=None, settle=None):
+        """Press keys together, and turn the loop until what they lead to."""
+        self.send("key", keys)
+        self._wait(until, settle)
+
+    def press(self, widget, window="panel", until=None, settle=None):
+        """Click a widget, and turn the loop until what that leads to."""
         self.find(widget, window)
         self.send("click", 1)
         self.app.step()
+        self._wait(until, settle)
+
+    def drag(self, *places, until):
+        """Press at the first place of the screen, go to the others, and let go once the condition holds."""
+        self.send("mousemove", *places[0], "mousedown", 1)
+        for place in places[1:]:
+            self.app.step()
+            self.send("mousemove", *place)
+        self.until(until)
+        self.send("mouseup", 1)
+        self.until_idle()
 
     def slide(self, widget, share):
         """Drag a slider of the panel to this share of its width."""
@@ -200,6 +246,11 @@ class Driver:
         self.send("type", "--delay", 20, text)
         self.until_idle()
 
+    def enter(self, text, until=None, settle=None):
+        """Type and press Enter, and turn the loop until what that leads to."""
+        self.type(text)
+        self.key("Return", until, settle)
+
     def close(self):
         """Close the window, as leaving the program does."""
         self.app.close()
@@ -207,6 +258,17 @@ class Driver:
     def image(self):
         """The picture as it was drawn last."""
         return self.app.scene_view.renderer.read_image()
+
+    def red_place(self):
+        """The middle (x, y) of the near square in the picture, in pixels: nothing else is red."""
+        image = self.image().astype(int)
+        rows, columns = np.nonzero(image[..., 0] > image[..., 1] + 60)
+        return columns.mean(), rows.mean()
+
+    def field_disparity(self, given):
+        """About the disparity of the views for one that was given."""
+        plan = self.app.state.scene.plan
+        return pytest.approx((given - plan.disparity_zero) * plan.disparity_scale, abs=1e-3)
 
 
 @pytest.fixture

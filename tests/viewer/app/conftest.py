@@ -1,22 +1,18 @@
 """A window with a photo, and a system without dialogs."""
 
-from dataclasses import replace
-
 import pytest
 
 from iibr_core.types import GridShape
-from viewer.model.preferences import with_sections
 
 
 @pytest.fixture
 def viewer(request, open_window, photo_path):
-    """All views of the photo are there; the pointer rests in the picture, off the near square. GRID of the module: of
-    the photo's views; OPEN_SECTIONS: of the panel, those that are used most if none.
+    """All views of the photo are there; the pointer rests in the picture, off the near square. OPEN_SECTIONS of the
+    module: of the panel, those that are used most if none.
     """
-    driver = open_window(photo_path, grid=getattr(request.module, "GRID", GridShape(3, 3)))
+    driver = open_window(photo_path, grid=GridShape(3, 3))
     if sections := getattr(request.module, "OPEN_SECTIONS", ()):
-        preferences = replace(driver.app.state.preferences, open_sections=with_sections((), *sections))
-        driver.app.state = replace(driver.app.state, preferences=preferences)
+        driver.open_sections(*sections)
     driver.until_idle()
     driver.send("mousemove", *driver.position(0.1, 0.1))
     driver.until_idle()

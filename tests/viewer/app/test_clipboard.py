@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.types import GridShape, InputError
-from tests.viewer.conftest import write_scene
+from tests.viewer.conftest import says, write_scene
 from viewer.app.clipboard import MAX_PASTED, paste_picture
 from viewer.model import lens
 from viewer.model.action import do
@@ -64,10 +64,8 @@ def test_pictures_and_paths_are_copied_and_pasted(open_window, photo_path, tmp_p
     for name, form in (("other", "{}"), ("third", "file://{}\r\n")):
         path = write_scene(tmp_path, name, seed=1)
         put(form.format(path).encode())
-        viewer.send("key", "ctrl+v")
-        viewer.settle(lambda app, path=path: app.state.source.path == str(path))
+        viewer.key("ctrl+v", settle=lambda app, path=path: app.state.source.path == str(path))
     put(b"some words")
     before = viewer.app.state.source
-    viewer.send("key", "ctrl+v")
-    viewer.until(lambda app: any("neither a picture" in notice.text for notice in app.state.notices))
+    viewer.key("ctrl+v", until=says("neither a picture"))
     assert viewer.app.state.source is before

@@ -51,8 +51,7 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer):
     viewer.until_idle()
     before, given = viewer.image(), disparity_of(viewer.app).copy()
     press_at(viewer, 0.5, 0.5)
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.stroke is None)
+    viewer.key("Escape", until=lambda app: app.state.stroke is None)
     viewer.send("mouseup", 1)
     viewer.settle(is_made)
     np.testing.assert_array_equal(disparity_of(viewer.app), given, "Escape takes a stroke back")
@@ -78,16 +77,14 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer):
     viewer.send("key", "ctrl+shift+z")
     until_made(viewer, generation + 3)
     np.testing.assert_array_equal(disparity_of(viewer.app), made)
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: not app.state.brush.is_on)
+    viewer.key("Escape", until=lambda app: not app.state.brush.is_on)
     assert not viewer.app.state.should_quit
 
 
 def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_elsewhere(viewer):
     given = disparity_of(viewer.app).copy()
     viewer.app.do(do(depth.set_brush, Brush(radius=0.15)))
-    viewer.press("Bucket")
-    viewer.until(lambda app: app.state.brush.is_on)
+    viewer.press("Bucket", until=lambda app: app.state.brush.is_on)
     viewer.send("mousemove", *viewer.position(0.1, 0.9))
     viewer.until_idle()
     viewer.send("keydown", "ctrl", "mousedown", 1)
@@ -113,18 +110,14 @@ def test_the_key_of_the_brush_and_the_heading_of_its_section_bring_it_into_sight
     viewer.until_idle()
     panel = imgui.internal.find_window_by_name("panel")
     assert panel.scroll.y == 0
-    viewer.send("key", "b")
-    viewer.settle(lambda app: app.state.brush.is_on)
+    viewer.key("b", settle=lambda app: app.state.brush.is_on)
     assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
     assert panel.scroll.y > 0
-    viewer.press("Smooth")
-    viewer.settle(lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
+    viewer.press("Smooth", settle=lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
     viewer.slide("##Size", 0.9)
     assert viewer.app.state.brush.radius > 0.1
-    viewer.send("key", "b")
-    viewer.until(lambda app: not app.state.brush.is_on)
-    viewer.press("###section Depth")
-    viewer.settle(lambda app: "depth" not in app.state.preferences.open_sections)
+    viewer.key("b", until=lambda app: not app.state.brush.is_on)
+    viewer.press("###section Depth", settle=lambda app: "depth" not in app.state.preferences.open_sections)
     _, y = viewer.find("###section Depth")
     panel.scroll.y -= max(panel.pos.y + panel.size.y - y - 40, 0)  # so that the heading lies at the bottom
     viewer.until_idle()
@@ -161,18 +154,13 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer, photo_path, tmp_pat
     viewer.press("Invert")
     until_made(viewer, 2)
     wanted = disparity_of(viewer.app).copy()
-    viewer.app.do(do(saving.ask_to_save, "map"))
-    viewer.settle(lambda app: isinstance(app.state.prompt, SavePrompt))
+    viewer.do(do(saving.ask_to_save, "map"), settle=lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "turned.npy"
-    viewer.type(out.name)
-    viewer.send("key", "Return")
-    viewer.settle(lambda app: out.exists())
+    viewer.enter(out.name, settle=lambda app: out.exists())
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
     viewer.do(do(messages.show_prompt, PathPrompt("map")))
-    viewer.type(out.name)
-    viewer.send("key", "Return")
-    viewer.until(lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
+    viewer.enter(out.name, until=lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
     viewer.settle(is_made)
     assert viewer.app.state.depth.edits == DepthEdits()
     np.testing.assert_array_equal(disparity_of(viewer.app), wanted)
@@ -188,8 +176,7 @@ def test_edits_need_no_photo_and_survive_a_bad_map(viewer, photo_path, tmp_path)
     until_made(viewer, 3)
     bad = tmp_path / "bad.pfm"
     bad.write_bytes(b"no map")
-    viewer.app.window.on_drop(None, [str(bad)])
-    viewer.until(lambda app: bool(app.state.notices))
+    viewer.drop(bad, until=lambda app: bool(app.state.notices))
     viewer.settle(is_made)
     assert viewer.app.state.notices[-1].is_error
     assert viewer.app.state.depth.edits.is_inverted
@@ -213,9 +200,7 @@ def test_a_click_selects_a_surface_to_move_it_and_to_keep_it_sharp(viewer):
     assert moved[32, 48] == pytest.approx(-0.1 * (NEAR - FAR), abs=0.01)
     assert moved[4, 4] == 0, "the wall stays"
     viewer.until(lambda app: app.state.selection is not None and app.state.selection.range_px[1] < near - 0.05)
-    viewer.press("Keep sharp")
-    viewer.until(lambda app: app.state.optics.aperture_diameter > 0)
+    viewer.press("Keep sharp", until=lambda app: app.state.optics.aperture_diameter > 0)
     assert app.state.optics.focus_disparity == pytest.approx(app.scene_view.pick(ViewOffset(0, 0), 48, 32), abs=0.05)
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.selection is None)
+    viewer.key("Escape", until=lambda app: app.state.selection is None)
     assert app.state.brush.is_on

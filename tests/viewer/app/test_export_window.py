@@ -3,6 +3,7 @@
 import threading
 from dataclasses import replace
 
+import glfw
 import pytest
 from PIL import Image, ImageSequence
 
@@ -15,7 +16,7 @@ from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import write_scene
+from tests.viewer.conftest import shows, write_scene
 from viewer.model import depth, gesture, lens, messages, opening, saving
 from viewer.model.action import do
 from viewer.model.saving import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
@@ -43,8 +44,7 @@ def export(kind, path, options=SMALL, may_replace=False):
 
 def start(viewer, path, options=SMALL):
     """Begin an export, and wait until some of it is drawn."""
-    viewer.app.do(export("gif", path, options))
-    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
+    viewer.do(export("gif", path, options), until=lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_an_export_asked_for_before_its_views_are_there_outlives_its_photo(open_
     assert f"Exported {early}" in texts(app)
     viewer.until_idle()
     app.do(do(opening.open_source, Source(str(photo_path), grid=GridShape(5, 5))))
-    viewer.settle(lambda app: app.state.scene is not None and app.state.scene.name == "scene")
+    viewer.settle(shows("scene"))
     app.do(do(messages.dismiss), do(lens.set_aperture, 2.0), export("gif", late))
     viewer.until(lambda app: f"Exported {late}" in texts(app))
     assert bytes_of(early) == bytes_of(late)
@@ -202,10 +202,10 @@ def test_closing_asks_while_something_is_exported(viewer, tmp_path, gate):
     app, out = viewer.app, tmp_path / "a.gif"
     gate.clear()
     start(viewer, out)
-    app.do(do(saving.quit_window))
-    assert app.state.prompt == "quit"
-    viewer.press("Wait, then quit", "prompt str")
-    viewer.until(lambda app: app.state.quits_when_done)
+    glfw.set_window_should_close(app.window.handle, True)
+    viewer.until(lambda app: app.state.prompt == "quit")
+    viewer.press("Wait, then quit", "prompt str", until=lambda app: app.state.quits_when_done)
+    assert app.state.prompt is None, "it asks once"
     assert not app.state.should_quit
     gate.set()
     viewer.until(lambda app: app.state.should_quit)
@@ -237,8 +237,7 @@ def test_the_prompt_stays_where_a_place_is_impossible_or_taken(viewer, tmp_path)
     app.do(do(ask, ExportTask(prompt)))
     viewer.until(lambda app: app.state.prompt == replace(prompt, already_there=True))
     assert there.read_text() == "mine"
-    viewer.press(f"Replace {there.name}", "prompt ExportPrompt")
-    viewer.until(lambda app: bool(texts(app)))
+    viewer.press(f"Replace {there.name}", "prompt ExportPrompt", until=lambda app: bool(texts(app)))
     assert texts(app) == [f"Exported {there}"]
     assert app.state.prompt is None
     with Image.open(there) as image:
@@ -253,8 +252,7 @@ def test_the_options_of_a_kind_are_typed_and_kept_for_the_next(viewer, tmp_path)
     viewer.send("key", "Tab")
     expected = ExportOptions(size=ScreenSize(48, 32), frames=2, rate=10.0)
     viewer.until(lambda app: app.state.prompt == ExportPrompt("gif", str(out), expected))
-    viewer.press("Export", window)
-    viewer.until(lambda app: bool(texts(app)))
+    viewer.press("Export", window, until=lambda app: bool(texts(app)))
     with Image.open(out) as image:
         assert (image.size, image.n_frames) == ((48, 32), 2)
         assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(image)) == 200

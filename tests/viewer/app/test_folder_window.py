@@ -11,7 +11,7 @@ from PIL import ImageGrab
 from iibr_core.scenes.scene import Source, WantedPhoto
 from iibr_core.types import GridShape
 from tests.iibr_core.scenes.test_opening import write_large_photo
-from tests.viewer.conftest import write_scene
+from tests.viewer.conftest import says, shows, write_scene
 from viewer.model import folder, history, lens, look
 from viewer.model.action import do
 
@@ -35,18 +35,12 @@ def middle_tile(app):
     return np.asarray(screen.crop(tuple(map(round, box))))
 
 
-def shows(driver, name):
-    driver.settle(lambda app: app.state.scene is not None and app.state.scene.name == name)
-
-
 def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer, tmp_path):
     next_photo = WantedPhoto(Source(str(tmp_path / "photo1.png"), grid=GridShape(3, 3)), 1.0)
     viewer.until(lambda app: app.scene_loader.ahead.get(next_photo) is not None)
     (tmp_path / "photo1.png").write_bytes(b"no photo any more")  # so that what is shown now was read before
-    viewer.send("key", "Page_Down")
-    shows(viewer, "photo1")
-    viewer.send("key", "Page_Up")
-    shows(viewer, "photo0")
+    viewer.key("Page_Down", settle=shows("photo1"))
+    viewer.key("Page_Up", settle=shows("photo0"))
     viewer.send("key", "Page_Up")
     viewer.until_idle()
     assert viewer.app.state.scene.name == "photo0"
@@ -78,23 +72,19 @@ def test_photos_that_cannot_be_read_have_their_names_in_the_filmstrip_and_keys_g
     driver = open_window(tmp_path, grid=GridShape(3, 3))
     driver.until(lambda app: app.state.folder is not None)
     assert driver.app.state.scene is None
-    driver.send("key", "Page_Down")
-    shows(driver, "photo1")
-    driver.send("key", "Page_Down")
-    driver.until(lambda app: any("photo2.jpg" in notice.text for notice in app.state.notices))
+    driver.key("Page_Down", settle=shows("photo1"))
+    driver.key("Page_Down", until=says("photo2.jpg"))
     driver.settle(lambda app: app._filmstrip.thumbnails((str(bad),)) == {str(bad): None})
     assert (middle_tile(driver.app).max(axis=2) > 150).sum() > 20  # letters
-    driver.send("key", "Page_Down")
-    shows(driver, "photo3")
+    driver.key("Page_Down", settle=shows("photo3"))
 
 
 @pytest.mark.usefixtures("wide_window")
 def test_the_filmstrip_shows_all_photos_and_opens_one(viewer, tmp_path):
     paths = tuple(str(tmp_path / f"photo{i}.png") for i in range(3))
     viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
-    shows(viewer, "photo0")
-    viewer.press("photo photo2.png", "filmstrip")
-    shows(viewer, "photo2")
+    viewer.settle(shows("photo0"))
+    viewer.press("photo photo2.png", "filmstrip", settle=shows("photo2"))
     generation = viewer.app.state.generation
     viewer.press("photo photo2.png", "filmstrip")
     viewer.until_idle()
@@ -103,7 +93,7 @@ def test_the_filmstrip_shows_all_photos_and_opens_one(viewer, tmp_path):
 
 @pytest.mark.usefixtures("wide_window")
 def test_the_menu_of_another_photo_gives_it_the_look_that_was_copied(viewer):
-    shows(viewer, "photo0")
+    viewer.settle(shows("photo0"))
     viewer.app.do(do(lens.set_exposure, 1.0), do(look.copy_look), do(lens.set_exposure, 0.0))
     viewer.find("photo photo2.png", "filmstrip")
     viewer.send("click", 3)
@@ -114,7 +104,7 @@ def test_the_menu_of_another_photo_gives_it_the_look_that_was_copied(viewer):
     viewer.send("mousemove", round(menu.pos.x + 30), round(menu.pos.y + 0.7 * menu.size.y))
     viewer.app.step()
     viewer.send("click", 1)
-    shows(viewer, "photo2")
+    viewer.settle(shows("photo2"))
     viewer.until(lambda app: app.state.optics.exposure_stops == 1.0)
     viewer.app.do(do(history.undo))
     assert viewer.app.state.optics.exposure_stops == 0.0

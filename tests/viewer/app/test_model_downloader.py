@@ -96,8 +96,7 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer, hub):
     viewer.do(do(gesture.end_gesture))
     edits = viewer.app.state.depth.edits
     assert wall_slope(viewer) > 0.5, "a guess has what is low near"
-    viewer.press(GET, "notices")
-    viewer.until(lambda app: app.state.models.downloading is not None)
+    viewer.press(GET, "notices", until=lambda app: app.state.models.downloading is not None)
     assert viewer.app.state.prompt is None, "the click was the consent"
     hub.may_finish.set()
     viewer.settle(is_deep)
@@ -117,17 +116,14 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer, hub):
 
 def test_a_download_is_cancelled_fails_and_is_tried_again_by_one_click_each(viewer, hub):
     before, model = viewer.app.state.source, hub.files["onnx/model.onnx"]
-    viewer.press(GET, "notices")
-    viewer.until(lambda app: app.state.models.downloading is not None)
-    viewer.press("Cancel##download", "notices")
-    viewer.until(lambda app: app.state.models.downloading is None)
+    viewer.press(GET, "notices", until=lambda app: app.state.models.downloading is not None)
+    viewer.press("Cancel##download", "notices", until=lambda app: app.state.models.downloading is None)
     hub.files["onnx/model.onnx"] = model[::-1]
     hub.may_finish.set()
     viewer.until_idle()
     assert model_here(MODEL) is None
     assert viewer.app.state.source is before
-    viewer.press(GET, "notices")
-    viewer.until(lambda app: any(notice.is_error for notice in app.state.notices))
+    viewer.press(GET, "notices", until=lambda app: any(notice.is_error for notice in app.state.notices))
     assert depth_kind(viewer.app) == "rough"
     hub.files["onnx/model.onnx"] = model
     viewer.press("Try again", "notices")
@@ -139,10 +135,8 @@ def test_without_a_connection_a_download_says_so_with_details(viewer, monkeypatc
     monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", nowhere)
     template = f"{nowhere}/{{repo_id}}/resolve/{{revision}}/{{filename}}"
     monkeypatch.setattr("huggingface_hub.constants.HUGGINGFACE_CO_URL_TEMPLATE", template)
-    viewer.press(GET, "notices")
-    viewer.until(lambda app: any(notice.text == OFFLINE for notice in app.state.notices))
-    viewer.press("Details", "notices")
-    viewer.until(lambda app: "127.0.0.1:9 cannot be reached" in app.state.notices[-1].text)
+    viewer.press(GET, "notices", until=lambda app: any(notice.text == OFFLINE for notice in app.state.notices))
+    viewer.press("Details", "notices", until=lambda app: "127.0.0.1:9 cannot be reached" in app.state.notices[-1].text)
     assert viewer.app.state.models.downloading is None
 
 
@@ -180,17 +174,12 @@ def open_another(driver, path):
 def test_a_model_is_offered_once_in_a_run_and_comes_back_by_the_badge(viewer, tmp_path):
     open_another(viewer, write_photo(tmp_path / "other.png", seed=9))
     assert offered_model(viewer.app.state) is None
-    viewer.press("Depth guessed", "Depth guessed")
-    viewer.until(lambda app: offered_model(app.state) is not None)
-    viewer.press("×##offer", "notices")
-    viewer.until(lambda app: offered_model(app.state) is None)
-    viewer.press("Depth guessed", "Depth guessed")
-    viewer.until(lambda app: offered_model(app.state) is not None)
-    viewer.press("Don't offer again", "notices")
-    viewer.until(lambda app: not app.state.preferences.offers_models)
+    viewer.press("Depth guessed", "Depth guessed", until=lambda app: offered_model(app.state) is not None)
+    viewer.press("×##offer", "notices", until=lambda app: offered_model(app.state) is None)
+    viewer.press("Depth guessed", "Depth guessed", until=lambda app: offered_model(app.state) is not None)
+    viewer.press("Don't offer again", "notices", until=lambda app: not app.state.preferences.offers_models)
     assert offered_model(viewer.app.state) is None
-    viewer.press("Depth guessed", "Depth guessed")
-    viewer.until(lambda app: offered_model(app.state) is not None)
+    viewer.press("Depth guessed", "Depth guessed", until=lambda app: offered_model(app.state) is not None)
     viewer.do(do(preferences.set_font_scale, 2.3))
     viewer.find(GET, "notices")
 
@@ -206,8 +195,7 @@ def test_a_running_estimate_is_given_up_by_one_click(downloaded, open_window, tm
         patched.setattr("iibr_core.scenes.photo.deepen", wait_to_be_stopped)
         viewer = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
         viewer.until(lambda app: is_running.is_set())
-        viewer.press("Cancel##estimate", "notices")
-        viewer.until(lambda app: depth_models.wanted_model(app.state) is None)
+        viewer.press("Cancel##estimate", "notices", until=lambda app: depth_models.wanted_model(app.state) is None)
         viewer.press("Depth guessed", "Depth guessed")
         with_offer(viewer)
     assert depth_kind(viewer.app) == "rough"

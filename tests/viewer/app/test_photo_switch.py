@@ -11,7 +11,7 @@ from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import write_scene
+from tests.viewer.conftest import shows, write_scene
 from viewer.model import depth, gesture, inspection, lens, opening, selection, viewpoint
 from viewer.model.action import do
 from viewer.model.depth import DepthSample
@@ -106,8 +106,7 @@ def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window, tmp_path):
     everything(driver)
     before = of_the_photo(driver.app.state)
     leave_picture(driver)
-    driver.app.do(do(opening.open_source, Source(str(after), grid=GRID)))
-    driver.settle(lambda app: app.state.scene is not None and app.state.scene.name == "next")
+    driver.do(do(opening.open_source, Source(str(after), grid=GRID)), settle=shows("next"))
     state, pictures = of_the_photo(driver.app.state), seen(driver)
     driver.close()
     fresh = open_window(after, grid=GRID)

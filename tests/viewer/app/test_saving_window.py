@@ -44,8 +44,7 @@ def save(path, size=TINY, may_replace=False, what="picture"):
 
 def start(viewer, path):
     """Begin a large picture, and wait until some of it is drawn."""
-    viewer.app.do(save(path, LARGE))
-    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
+    viewer.do(save(path, LARGE), until=lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
 def texts(viewer):
@@ -81,8 +80,7 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer, tmp_path):
     viewer.until(lambda app: len(app.state.jobs) == 2)
     for _ in range(3):  # the rows settle
         app.step()
-    viewer.press(f"Cancel##job {app.state.jobs[0].id}", "notices")
-    viewer.until(lambda app: not app.state.jobs)
+    viewer.press(f"Cancel##job {app.state.jobs[0].id}", "notices", until=lambda app: not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / 'next.png'}"]
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
 
@@ -98,8 +96,7 @@ def test_enter_replaces_no_photo_and_a_failure_is_an_error(viewer, tmp_path, mon
         asked = SavePrompt(str(other), TINY, already_there)
         viewer.settle(lambda app, asked=asked: app.state.prompt == asked)
     assert other.read_bytes() == kept
-    viewer.press("Replace other.png", "prompt SavePrompt")
-    viewer.until(lambda app: texts(viewer) == [f"Saved {other}"])
+    viewer.press("Replace other.png", "prompt SavePrompt", until=lambda app: texts(viewer) == [f"Saved {other}"])
     assert other.read_bytes() != kept
 
     def fail(*_):
@@ -107,8 +104,7 @@ def test_enter_replaces_no_photo_and_a_failure_is_an_error(viewer, tmp_path, mon
 
     with monkeypatch.context() as broken:
         broken.setattr("viewer.app.saving.export_picture", fail)
-        viewer.app.do(do(messages.dismiss), save(tmp_path / "a.png"))
-        viewer.until(lambda app: bool(app.state.notices))
+        viewer.do(do(messages.dismiss), save(tmp_path / "a.png"), until=lambda app: bool(app.state.notices))
     assert [(notice.text, notice.is_error) for notice in app.state.notices] == [("the disk is full", True)]
     path = tmp_path / "scene_disparity.pfm"
     for may_replace in (False, True):
@@ -124,11 +120,9 @@ def test_a_bare_name_goes_to_the_folder_that_the_field_showed_and_stays_in_the_l
     """Also after an error, for which the field keeps the cursor."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    viewer.send("key", "ctrl+s")
-    viewer.settle(lambda app: isinstance(app.state.prompt, SavePrompt))
+    viewer.key("ctrl+s", settle=lambda app: isinstance(app.state.prompt, SavePrompt))
     for name in (" small.xyz", " small.png"):
-        viewer.type(name)
-        viewer.send("key", "Return")
+        viewer.enter(name)
         viewer.until_idle()
     viewer.until(lambda app: bool(app.state.files))
     saved = photo_path.with_name("small.png")
@@ -136,8 +130,7 @@ def test_a_bare_name_goes_to_the_folder_that_the_field_showed_and_stays_in_the_l
     assert read_settings(saved).optics == viewer.app.state.optics
     assert texts(viewer) == [f"Saved {saved}"]
     viewer.app.do(do(messages.dismiss))
-    viewer.press("###files")
-    viewer.settle(lambda app: app.state.prompt == "files")
+    viewer.press("###files", settle=lambda app: app.state.prompt == "files")
     viewer.find("Show in folder##0", "prompt str")
 
 
@@ -152,8 +145,7 @@ def test_nothing_is_saved_onto_what_the_window_reads(viewer, photo_path):
         before = path.read_bytes()
         viewer.app.do(do(messages.show_prompt, None))
         viewer.until_idle()  # an active field keeps its text
-        viewer.app.do(save(path, may_replace=True, what=what))
-        viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
+        viewer.do(save(path, may_replace=True, what=what), until=lambda app: isinstance(app.state.prompt, SavePrompt))
         prompt = viewer.app.state.prompt
         assert (prompt.path, prompt.already_there) == (str(path), False)
         assert prompt.problem
@@ -176,8 +168,7 @@ def test_closing_the_window_waits_for_what_is_being_written(viewer, tmp_path, mo
     close_jobs = Jobs.close
     monkeypatch.setattr("viewer.app.saving.export_picture", write)
     monkeypatch.setattr(Jobs, "close", close)
-    viewer.app.do(save(out, SIZE))
-    viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].doing == WRITING)
+    viewer.do(save(out, SIZE), until=lambda app: bool(app.state.jobs) and app.state.jobs[0].doing == WRITING)
     viewer.close()
     assert read_photo(out).pixels.shape == (*SIZE[::-1], 3)
     assert not list(tmp_path.glob(".iibr-*"))

@@ -15,7 +15,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import DEADLINE_S, rests
+from tests.viewer.conftest import DEADLINE_S, rests, says
 from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
@@ -130,7 +130,7 @@ def test_a_damaged_session_is_named_and_replaced(open_window, photo_path, tmp_pa
     text = "[" * 100_000
     write_session(tmp_path / "kept", photo_path, text)
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-    driver.until(lambda app: any("damaged" in notice.text for notice in app.state.notices))
+    driver.until(says("damaged"))
     change(driver)
     driver.until(lambda app: sessions_in(tmp_path / "kept")[0].read_text() != text)
 
@@ -183,4 +183,4 @@ def test_a_folder_that_cannot_be_written_gives_one_notice(open_window, photo_pat
     driver.until_idle()
     (tmp_path / "kept" / "sessions").write_text("a file is in the way")
     change(driver)
-    driver.until(lambda app: any("not kept" in notice.text for notice in app.state.notices))
+    driver.until(says("not kept"))

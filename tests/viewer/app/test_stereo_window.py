@@ -89,8 +89,7 @@ def test_all_arrangements_reach_the_second_monitor(viewer, display):
         viewer.do(do(stereo.set_mode, mode))
         shown[mode] = grabbed(display, FIRST.width, SECOND)
     viewer.app.do(do(stereo.set_mode, "columns"))
-    viewer.send("key", "l")
-    viewer.settle(lambda app: app.state.preferences.swaps_eyes)
+    viewer.key("l", settle=lambda app: app.state.preferences.swaps_eyes)
     swapped = grabbed(display, FIRST.width, SECOND)
     with eyes_of(viewer) as eyes:
         for mode, pixels in shown.items():
@@ -105,28 +104,21 @@ def test_mouse_and_keys_on_the_second_monitor_count(viewer):
     viewer.do(do(stereo.show, True), do(stereo.set_mode, "half-sbs"))
     viewer.send("mousemove", FIRST.width + 480, 240)
     viewer.until(lambda app: app.state.hover is not None and abs(app.state.hover.x_px - 48) < 2)
-    viewer.send("mousedown", 1)
-    viewer.app.step()
-    viewer.send("mousemove", FIRST.width + 430, 240)
-    viewer.until(lambda app: app.state.optics.eye.s > 0)
-    viewer.send("mouseup", 1)
-    viewer.until_idle()
+    places = (FIRST.width + 480, 240), (FIRST.width + 430, 240)
+    viewer.drag(*places, until=lambda app: app.state.optics.eye.s > 0)
     focus = viewer.app.state.optics.focus_disparity
     viewer.send("click", 4)
     viewer.settle(lambda app: app.state.optics.focus_disparity > focus)
     picture = viewer.app.stereo_screen.view.drawn
     assert picture.weave.eyes[0].optics.focus_disparity == viewer.app.state.optics.focus_disparity
-    viewer.send("key", "Tab")
-    viewer.until(lambda app: app.state.is_panel_hidden)
-    viewer.send("key", "Escape")
-    viewer.settle(lambda app: not app.state.stereo.is_shown)
+    viewer.key("Tab", until=lambda app: app.state.is_panel_hidden)
+    viewer.key("Escape", settle=lambda app: not app.state.stereo.is_shown)
     assert viewer.app.stereo_screen.second is None
 
 
 def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(viewer, display):
     place = viewer.app.window.place
-    viewer.send("key", "3")
-    viewer.settle(lambda app: app.stereo_screen.second is not None)
+    viewer.key("3", settle=lambda app: app.stereo_screen.second is not None)
     subprocess.run(["xrandr", "--output", "DUMMY1", "--off"], check=True)
     try:
         viewer.until(lambda app: not app.state.stereo.is_shown)
@@ -136,11 +128,9 @@ def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(vi
         viewer.do(do(stereo.set_mode, "anaglyph"), do(messages.dismiss))
         assert viewer.app.state.is_panel_hidden
         alone = grabbed(display, 0, FIRST)
-        viewer.send("key", "Tab")
-        viewer.settle(lambda app: not app.state.is_panel_hidden)
+        viewer.key("Tab", settle=lambda app: not app.state.is_panel_hidden)
         under_panel = grabbed(display, 0, FIRST)
-        viewer.send("key", "Escape")
-        viewer.settle(lambda app: not app.state.stereo.is_shown and not app.window.is_fullscreen)
+        viewer.key("Escape", settle=lambda app: not app.state.stereo.is_shown and not app.window.is_fullscreen)
         assert viewer.app.window.place == place
     finally:
         subprocess.run(["xrandr", "--output", "DUMMY1", "--mode", "640x480", "--pos", f"{FIRST.width}x0"], check=True)
@@ -161,8 +151,7 @@ def test_monitor_and_arrangement_are_remembered(open_window, photo_path, tmp_pat
     kept = load_preferences(AppState(), tmp_path).preferences
     assert (kept.stereo_mode, kept.swaps_eyes, kept.stereo_monitor) == ("rows", True, wanted)
     second = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
-    second.app.do(do(stereo.show, True))
-    second.until(lambda app: app.stereo_screen.second is not None)
+    second.do(do(stereo.show, True), until=lambda app: app.stereo_screen.second is not None)
     assert second.app.stereo_screen.second.monitor == wanted
 
 

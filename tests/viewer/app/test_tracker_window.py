@@ -5,7 +5,6 @@ import struct
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE
@@ -72,24 +71,17 @@ def lean(viewer, send, right, up=0.0):
 def test_a_head_that_goes_right_and_up_moves_near_things_left_and_down(following, send):
     lean(following, send, 0)
     following.until_idle()
-    before = red_middle(following)
+    before = following.red_place()
     lean(following, send, 14, 14)
     following.until_idle()
     eye = following.app.state.optics.eye
     assert eye.s > 0.9
     assert eye.t < -0.9
-    after = red_middle(following)
+    after = following.red_place()
     assert after[0] < before[0] - 2
     assert after[1] > before[1] + 2
     assert following.app.state.tracking.latency_ms > 0
     assert not following.app.state.history.past
-
-
-def red_middle(viewer):
-    """Return the middle (x, y) of the near red square in the picture, in pixels."""
-    image = viewer.image()[..., :3].astype(float)
-    rows, columns = np.nonzero(image[..., 0] > image[..., 1] + 60 * image.max() / 255)
-    return float(columns.mean()), float(rows.mean())
 
 
 def test_the_window_rests_while_packets_repeat_a_place_and_after_they_stop(following, send):
@@ -122,14 +114,12 @@ def test_a_flood_moves_the_window_and_does_not_fill_it(following, port):
 def test_a_key_switches_it_on_and_off_at_the_port_that_was_given_last(viewer, port, send):
     app = viewer.app
     app.do(do(tracking.switch, f"udp:{port}"), do(tracking.switch, None))
-    viewer.send("key", "h")
-    viewer.until(lambda app: app.state.tracking is not None)
+    viewer.key("h", until=lambda app: app.state.tracking is not None)
     lean(viewer, send, 0)
     lean(viewer, send, 9)
     viewer.until_idle()
     eye = app.state.optics.eye
-    viewer.send("key", "h")
-    viewer.settle(lambda app: app.state.tracking is None)
+    viewer.key("h", settle=lambda app: app.state.tracking is None)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
     assert app.state.optics.eye == eye
@@ -138,8 +128,7 @@ def test_a_key_switches_it_on_and_off_at_the_port_that_was_given_last(viewer, po
 def test_a_port_in_use_is_an_error_that_names_it(viewer, port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
-        viewer.app.do(do(tracking.switch, f"udp:{port}"))
-        viewer.until(lambda app: app.state.tracking is None)
+        viewer.do(do(tracking.switch, f"udp:{port}"), until=lambda app: app.state.tracking is None)
     notice = viewer.app.state.notices[-1]
     assert notice.is_error
     assert notice.text.startswith(f"cannot listen at 127.0.0.1:{port} (")
@@ -148,8 +137,7 @@ def test_a_port_in_use_is_an_error_that_names_it(viewer, port):
 
 def test_a_notice_comes_once_while_no_poses_arrive(viewer, port, monkeypatch):
     monkeypatch.setattr(tracker, "SILENCE_S", 0.0)
-    viewer.app.do(do(tracking.switch, f"udp:{port}"))
-    viewer.until(lambda app: bool(app.state.notices))
+    viewer.do(do(tracking.switch, f"udp:{port}"), until=lambda app: bool(app.state.notices))
     assert viewer.app.state.notices[-1].text.startswith(f"No poses at 127.0.0.1:{port}: ")
     viewer.until_idle()
     assert len(viewer.app.state.notices) == 1

@@ -11,20 +11,12 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import FAR, NEAR, write_scene
+from tests.viewer.conftest import FAR, NEAR, says, shows, write_scene
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model import lens, messages
 from viewer.model.action import do
-
-GRID = GridShape(5, 5)
-
-
-def shown_focus(viewer, given):
-    """The field disparity of a given one."""
-    scene = viewer.app.state.scene
-    return (given - scene.plan.disparity_zero) * scene.plan.disparity_scale
 
 
 def icon_sizes(driver):
@@ -58,18 +50,12 @@ def test_an_empty_window_has_an_icon(open_window):
 def test_views_that_the_graphics_card_cannot_hold_are_an_error(open_window, photo_path, monkeypatch):
     driver = open_window(photo_path, grid=GridShape(5, 5))
     monkeypatch.setitem(driver.app.scene_view.renderer.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
-    driver.until(lambda app: any("use at most 3x3 views" in notice.text for notice in app.state.notices))
+    driver.until(says("use at most 3x3 views"))
     driver.app.do(do(messages.dismiss))
 
 
-def near_centre(image):
-    """Column of the near square's middle: nothing else is red."""
-    red = image[..., 0].astype(int) - image[..., 1] > 60
-    return float(np.nonzero(red)[1].mean())
-
-
 def test_drags_move_the_viewpoint_whole_however_few_frames_they_take(viewer):
-    app, (x, y), before = viewer.app, viewer.position(0.5, 0.5), viewer.image()
+    app, (x, y), before = viewer.app, viewer.position(0.5, 0.5), viewer.red_place()
     scene = app.state.scene
     per_view = units_per_view(app.layout(), scene)
     for moves in (1, 5):
@@ -80,7 +66,7 @@ def test_drags_move_the_viewpoint_whole_however_few_frames_they_take(viewer):
         viewer.settle(lambda app: app.state.optics.eye != CENTRE)
         assert app.state.optics.eye == pytest.approx(ViewOffset(-10 / per_view, -60 / per_view))
         assert app.state.optics.focus_disparity == 0, "a drag is no click"
-        assert near_centre(viewer.image()) > near_centre(before), "near things follow the hand"
+        assert viewer.red_place()[0] > before[0], "near things follow the hand"
         app.do(do(lens.reset))
         viewer.until_idle()
 
@@ -89,25 +75,21 @@ def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer):
     pinhole = viewer.image()
     for place, given in (((0.5, 0.5), NEAR), ((0.1, 0.1), FAR)):
         viewer.send("mousemove", *viewer.position(*place), "click", 1)
-        wanted = pytest.approx(shown_focus(viewer, given), abs=1e-3)
+        wanted = viewer.field_disparity(given)
         viewer.settle(lambda app, wanted=wanted: app.state.optics.focus_disparity == wanted)
     focus = viewer.app.state.optics.focus_disparity
     assert (viewer.image() != pinhole).any(), "the first click opens the aperture: else nothing would be seen"
     viewer.send("click", 4)
     viewer.until(lambda app: app.state.optics.focus_disparity > focus)
-    viewer.send("key", "Down")
-    viewer.until(lambda app: app.state.optics.eye.t > 0)
-    viewer.send("key", "r")
-    viewer.until(lambda app: app.state.optics == Optics())
-    viewer.send("key", "Right")
-    viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 0.5))
+    viewer.key("Down", until=lambda app: app.state.optics.eye.t > 0)
+    viewer.key("r", until=lambda app: app.state.optics == Optics())
+    viewer.key("Right", until=lambda app: app.state.optics.eye == ViewOffset(0, 0.5))
     viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", "--repeat", 2, "--delay", 40, 1)
     viewer.until(lambda app: app.state.optics == Optics())
     viewer.send("key", "Escape")
     viewer.until_idle()
     assert not viewer.app.state.should_quit
-    viewer.send("key", "ctrl+q")
-    viewer.until(lambda app: app.state.should_quit)
+    viewer.key("ctrl+q", until=lambda app: app.state.should_quit)
 
 
 def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_one_edit(viewer):
@@ -119,7 +101,10 @@ def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_on
         app.step()
         assert app.wait_s > 0
     assert (app.frames_shown, app.scene_view.pictures_drawn) == (shown, drawn)
-    panel = app.layout().panel
+    window = glfw.get_x11_window(app.window.handle)
+    viewer.send("windowunmap", "--sync", window, "windowmap", "--sync", window)
+    viewer.settle(lambda app: app.frames_shown > shown)  # what was covered is drawn again
+    shown, panel = app.frames_shown, app.layout().panel
     for y in range(60, 260, 40):
         viewer.send("mousemove", int(panel.x + 0.8 * panel.width), y)
         viewer.until_idle()
@@ -134,12 +119,11 @@ def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_on
 
 def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer, tmp_path):
     viewer.app.window.on_drop(None, [str(write_scene(tmp_path, "other", seed=1))])
-    viewer.settle(lambda app: app.state.scene is not None and app.state.scene.name == "other")
+    viewer.settle(shows("other"))
     broken = tmp_path / "broken.png"
     broken.write_bytes(b"this is no picture")
     before = viewer.image()
-    viewer.app.window.on_drop(None, [str(broken)])
-    viewer.until(lambda app: bool(app.state.notices))
+    viewer.drop(broken, until=lambda app: bool(app.state.notices))
     assert viewer.app.state.notices[0].is_error
     assert "broken.png" in viewer.app.state.notices[0].text
     viewer.until_idle()
@@ -148,16 +132,17 @@ def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer, tmp_path
     # A name that is no text, as GLFW hands it over: its wrapper raises in the midst of the loop.
     ((_, callback),) = glfw._window_drop_callback_repository.values()
     callback(viewer.app.window.handle, 1, (ctypes.c_char_p * 1)(b"/gone/\xff.png"))
-    viewer.until(lambda app: any("no such file" in notice.text for notice in app.state.notices))
+    viewer.until(says("no such file"))
 
 
-@pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [0, 0, 1e308, float("nan")]])
-def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(open_window, tmp_path, kept):
+@pytest.mark.parametrize("kept", [[40, 50, 600, 700], [0, 0, 40_000, 40_000], [0, 0, 1e308, float("nan")]])
+def test_a_window_opens_where_it_was_left_and_no_larger_than_the_screen(open_window, tmp_path, kept):
     (tmp_path / PREFERENCES_FILE).write_text(json.dumps({"window": kept}))
     window = open_window(None, kept_in=tmp_path).app.window
     _, _, width, height = glfw.get_monitor_workarea(glfw.get_primary_monitor())
     assert 200 <= window.size.width <= width
     assert 150 <= window.size.height <= height
+    assert window.place == tuple(kept) or kept[2] != 600
 
 
 def test_views_come_nearest_first_to_where_the_user_looks(open_window, photo_path):

@@ -13,33 +13,22 @@ from viewer.model.lens import TiltHandles
 from viewer.model.messages import Notice
 
 
-def field_disparity(app, given):
-    plan = app.state.scene.plan
-    return (given - plan.disparity_zero) * plan.disparity_scale
-
-
 def test_pad_loop_and_double_click_move_the_viewpoint(viewer, monkeypatch):
     app = viewer.app
     # a busy machine may draw for longer than the usual 0.3 s between the two clicks
     monkeypatch.setattr("viewer.ui.host.DOUBLE_CLICK_S", 60.0)
     x, y = viewer.find("pad")
     for (across, down), end in (((-200, -200), ViewOffset(-1, -1)), ((200, 200), ViewOffset(1, 1))):
-        viewer.send("mousemove", x, y, "mousedown", 1)
-        viewer.send("mousemove", x + across, y + down)
-        viewer.until(lambda app, end=end: app.state.optics.eye == end)
-        viewer.send("mouseup", 1)
-        viewer.until_idle()
+        viewer.drag((x, y), (x + across, y + down), until=lambda app, end=end: app.state.optics.eye == end)
     assert len(app.state.history.past) == 2
     viewer.press("Circle")
     drawn = app.scene_view.pictures_drawn
     viewer.until(lambda app: app.scene_view.pictures_drawn >= drawn + 5)
-    viewer.send("key", "space")
-    viewer.settle(lambda app: app.state.motion.is_paused)
+    viewer.key("space", settle=lambda app: app.state.motion.is_paused)
     drawn, eye = app.scene_view.pictures_drawn, app.state.optics.eye
     app.step()
     assert (app.scene_view.pictures_drawn, app.state.optics.eye) == (drawn, eye), "nothing moves in a pause"
-    viewer.press("Circle")
-    viewer.until(lambda app: app.state.motion.kind is None)
+    viewer.press("Circle", until=lambda app: app.state.motion.kind is None)
     kept = app.state.optics
     viewer.send("mousemove", *viewer.position(0.1, 0.1), "click", "--repeat", 2, "--delay", 40, 1)
     viewer.settle(lambda app: app.state.optics.eye == ViewOffset(0, 0))
@@ -48,37 +37,29 @@ def test_pad_loop_and_double_click_move_the_viewpoint(viewer, monkeypatch):
 
 def test_two_clicks_are_racked_between_by_a_key(viewer):
     app = viewer.app
-    near, far = (pytest.approx(field_disparity(app, given), abs=1e-3) for given in (NEAR, FAR))
+    near, far = map(viewer.field_disparity, (NEAR, FAR))
     for place, wanted in (((0.5, 0.5), near), ((0.15, 0.15), far)):
         viewer.send("mousemove", *viewer.position(*place))
         viewer.until(lambda app, w=wanted: app.state.hover is not None and app.state.hover.disparity == w)
         viewer.send("click", 1)
         viewer.settle(lambda app, w=wanted: app.state.optics.focus_disparity == w)
-    viewer.send("key", "x")
-    viewer.until(lambda app: app.state.motion.kind == "rack" and app.state.optics.focus_disparity == near)
+    viewer.key("x", until=lambda app: app.state.motion.kind == "rack" and app.state.optics.focus_disparity == near)
     viewer.until(lambda app: app.state.motion.kind is None)
     assert app.state.optics.focus_disparity == far
 
 
 def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer):
-    viewer.send("key", "t")
-    viewer.until(lambda app: app.state.tilt_handles is not None)
+    viewer.key("t", until=lambda app: app.state.tilt_handles is not None)
     picture = viewer.app.layout().picture
     (x, y), _ = handle_points(TiltHandles(), picture)
-    viewer.send("mousemove", round(x), round(y), "mousedown", 1)
-    viewer.send("mousemove", round(x) + 20, round(y))
-    viewer.send("mousemove", *viewer.position(0.5, 0.5))
-    near = field_disparity(viewer.app, NEAR)
-    viewer.until(lambda app: sharp_disparity(app.state.optics, (0, 0)) == pytest.approx(near, abs=1e-3))
-    viewer.send("mouseup", 1)
-    viewer.until_idle()
+    near = viewer.field_disparity(NEAR)
+    places = (round(x), round(y)), (round(x) + 20, round(y)), viewer.position(0.5, 0.5)
+    viewer.drag(*places, until=lambda app: sharp_disparity(app.state.optics, (0, 0)) == near)
     optics = viewer.app.state.optics
     assert optics.eye == ViewOffset(0, 0)
     assert sharp_disparity(optics, TiltHandles().second) == pytest.approx(0, abs=1e-3), "the other one held"
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.tilt_handles is None)
-    viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.optics == Optics())
+    viewer.key("Escape", until=lambda app: app.state.tilt_handles is None)
+    viewer.key("ctrl+z", until=lambda app: app.state.optics == Optics())
 
 
 DRAWS = (

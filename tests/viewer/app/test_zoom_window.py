@@ -6,7 +6,7 @@ import pytest
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import NEAR
+from tests.viewer.conftest import NEAR, says
 from viewer.background.newest import Newest
 from viewer.model import lens, viewpoint
 from viewer.model.action import do
@@ -45,20 +45,17 @@ def test_wheel_keys_and_middle_button_zoom_and_pull_the_picture(viewer):
     viewer.until(lambda app: app.layout().scale == 1.0)
     frame_px = app.layout().frame_px
     assert frame_px.size == (96, 64)
-    viewer.send("key", "0")
-    viewer.until(lambda app: app.state.zoom is None)
+    viewer.key("0", until=lambda app: app.state.zoom is None)
     assert app.state.optics == optics, "nothing else was moved"
 
 
 def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer):
-    scene = viewer.app.state.scene
     zoom_to(viewer, Zoom(4 * viewer.app.layout().fit, (0.5, 0.5)))
     viewer.until_idle()
     frame = viewer.app.layout().frame
     # At the left border of the frame: unzoomed, the far wall would be there.
     viewer.send("mousemove", round(frame.x + 0.1 * frame.width), round(frame.y + frame.height / 2), "click", 1)
-    near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
-    viewer.until(lambda app: app.state.optics.focus_disparity == pytest.approx(near, abs=0.2))
+    viewer.until(lambda app: app.state.optics.focus_disparity == viewer.field_disparity(NEAR))
 
 
 def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window, photo_path):
@@ -87,7 +84,7 @@ def test_a_photo_that_is_gone_is_reported_once_and_the_views_stay(open_window, p
     viewer.until_idle()
     photo_path.unlink()
     zoom_to(viewer, Zoom(1.0))
-    viewer.settle(lambda app: any("full detail" in notice.text for notice in app.state.notices))
+    viewer.settle(says("full detail"))
     assert viewer.app.sharpener.pixels is None
     assert viewer.image().std() > 10
     asked = []

@@ -16,10 +16,7 @@ from iibr_core.types import ViewOffset
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square
 from tests.viewer.cli.conftest import output_of, refusal_of
-from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH
-
-SQUARE, BACK, FLOOR = np.s_[20:44, 36:60], np.s_[2:10, 2:90], np.s_[56:, :]
-"""Parts of `write_scene`: the near square, the wall above it, and a floor between both, added here."""
+from tests.viewer.conftest import HEIGHT, NEAR, WIDTH
 
 
 @pytest.fixture
@@ -71,36 +68,16 @@ def test_a_photo_without_depth_gets_a_guess_or_a_models(iibr, folder, options, i
     assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
 
 
-def write_map(photo, kind):
-    """Write a map of this kind beside the photo; a depth in metres is 1 / (a + b * disparity)."""
-    given = photo.with_name("scene_disparity.npy")
-    disparity = uniform_filter(np.load(given), 5)  # so that its edges are refined
-    disparity[FLOOR] = (NEAR + FAR) / 2
-    np.save(given, disparity)
-    if kind != "disparity":
-        given.unlink()
-    if kind == "depth":
-        np.save(photo.with_name("scene_depth.npy"), (1.0 / (0.1 + 0.3 * (disparity - FAR))).astype(np.float32))
-    elif kind == "depth picture":  # white is near
-        near = (255 * (disparity - FAR) / (NEAR - FAR)).astype(np.uint8)
-        Image.fromarray(near).save(photo.with_name("scene_depth.png"))
-
-
-@pytest.mark.parametrize("kind", ["disparity", "depth", "depth picture"])
-def test_python_and_commands_give_the_same_numbers(iibr, photo_path, folder, kind):
-    write_map(photo_path, kind)
+def test_python_and_commands_give_the_same_numbers(iibr, photo_path, folder):
+    given = photo_path.with_name("scene_disparity.npy")
+    np.save(given, uniform_filter(np.load(given), 5))  # so that its edges are refined
     field = iibr_core.open(photo_path).light_field(3)
     output_of(iibr("generate", photo_path, "--grid", 3, "-o", "field", "--with-disparity"))
     written = iibr_core.open("field").light_field()
     np.testing.assert_array_equal(written.views, field.views)
     np.testing.assert_array_equal(written.disparity, field.disparity)
-    near, far = (np.median(field.disparity[1, 1][part]) for part in (SQUARE, BACK))
-    assert near > far + 0.5, "what is near moves most"
-    disparity = iibr_core.open(photo_path, refine=False).disparity
     output_of(iibr("depth", photo_path, "--refine", "off", "-o", "map.npy"))
-    np.testing.assert_allclose(np.load("map.npy"), disparity, rtol=1e-5)
-    near, far, between = (np.median(disparity[part]) for part in (SQUARE, BACK, FLOOR))
-    assert (between - far) / (near - far) == pytest.approx(0.5, abs=0.03)
+    np.testing.assert_allclose(np.load("map.npy"), iibr_core.open(photo_path, refine=False).disparity, rtol=1e-5)
 
 
 def pixels_of(path):
