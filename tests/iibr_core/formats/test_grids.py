@@ -220,19 +220,6 @@ def test_a_step_of_stanford_is_the_spacing_of_columns_else_of_rows(tmp_path, row
     assert np.ptp(places, axis=0)[1 if columns > 1 else 0] == pytest.approx(1), "in steps of the views that are there"
 
 
-def test_middlebury_pair_from_the_left(tmp_path) -> None:
-    folder = write_numbered(tmp_path / "pair", {f"im{n}.png": ViewOffset(0, n) for n in (0, 1)}, (HEIGHT, WIDTH))
-    disparity = np.full((HEIGHT, WIDTH), 7.5, np.float32)
-    disparity[0, 0] = np.inf
-    write_pfm(folder / "disp0.pfm", disparity)
-    scene = scene_of(folder)
-    assert (scene.layout, scene.centre) == ("Middlebury pair", 0)
-    assert offset_by_file(scene) == {"im0": (0, 0), "im1": (0, 1)}
-    known = read_disparity(scene.disparity[0].path, ImageSize(HEIGHT, WIDTH), scene.disparity[0].scale)
-    assert known.values[1, 1] == 7.5
-    assert np.isfinite(known.values).all()
-
-
 @pytest.mark.parametrize(
     ("kind", "count", "truths", "extension", "width", "factor"),
     [
