@@ -62,9 +62,8 @@ def outpaint(
     _find_lines(colors, frame, lines)
 
     def band(first: int, last: int) -> None:
-        _extend_rows(colors, disparity, number, means, margins, (first, last), grown, surfaces)
-        if stages.outpainted_lines:
-            _follow_lines(number, frame, means, lines, margins, first, last, grown)
+        frame_of = number, frame, means, lines
+        _extend_rows(colors, disparity, frame_of, stages.outpainted_lines, margins, (first, last), grown, surfaces)
 
     in_bands(band, larger)
     return grown, surfaces
@@ -110,9 +109,11 @@ def _texture(colors, y, x, c):
 
 
 @kernel
-def _extend_rows(colors, disparity, number, means, margins, rows, grown, surfaces):
-    """Fill rows [first, last) of the larger image without following lines."""
-    (height, width), (top, _, left, _) = disparity.shape, margins
+def _extend_rows(colors, disparity, frame_of, follows_lines, margins, rows, grown, surfaces):
+    """Fill rows [first, last) of the larger image. frame_of: number of each pixel of the frame, the pixels, their means
+    and lines.
+    """
+    (height, width), (top, _, left, _), (number, frame, means, lines) = disparity.shape, margins, frame_of
     for row in range(*rows):
         for column in range(grown.shape[1]):
             y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
@@ -133,6 +134,8 @@ def _extend_rows(colors, disparity, number, means, margins, rows, grown, surface
             for c in range(3):
                 mean = means[k, place, c] + part * (means[k + 1, place, c] - means[k, place, c])
                 grown[row, column, c] = max(mean + share * _texture(colors, v, u, c), 0.0)
+            if follows_lines:
+                _blend_lines(frame, means, lines, place, away, (row - top, column - left, width), grown[row, column])
 
 
 @kernel
@@ -175,31 +178,23 @@ def _line_weight(line_cos, line_sin, down, across):
 
 
 @kernel
-def _follow_lines(number, frame, means, lines, margins, first, last, grown):
-    """Blend the lines of the frame into rows [first, last), more where they lead there straighter."""
-    (height, width), (top, _, left, _) = number.shape, margins
-    for row in range(first, last):
-        for column in range(grown.shape[1]):
-            y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
-            away = hypot(row - top - y, column - left - x)
-            if away == 0.0:
-                continue
-            place, step = number[y, x], SLANT * away / PLACES
-            # A mean as wide as the distance between two places.
-            level = _level(step)
-            k = min(int(level), len(means) - 2)
-            part = np.float32(level - k)
-            total = red = green = blue = 0.0
-            for j in range(-PLACES, PLACES + 1):
-                n = nearest_pixel(place + j * step) % len(frame)
-                down, across = row - top - frame[n] // width, column - left - frame[n] % width
-                weight = _line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across)
-                total += weight
-                red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
-                green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))
-                blue += weight * (means[k, n, 2] + part * (means[k + 1, n, 2] - means[k, n, 2]))
-            # The other colours have a weight of 1.
-            rest = 1.0 / (1.0 + total)
-            grown[row, column, 0] = rest * (grown[row, column, 0] + red)
-            grown[row, column, 1] = rest * (grown[row, column, 1] + green)
-            grown[row, column, 2] = rest * (grown[row, column, 2] + blue)
+def _blend_lines(frame, means, lines, place, away, pixel, color):
+    """Blend the lines of the frame into the colour (3) of a pixel beyond it, more where they lead there straighter."""
+    row, column, width = pixel
+    step = SLANT * away / PLACES
+    # A mean as wide as the distance between two places.
+    level = _level(step)
+    k = min(int(level), len(means) - 2)
+    part = np.float32(level - k)
+    total = red = green = blue = 0.0
+    for j in range(-PLACES, PLACES + 1):
+        n = nearest_pixel(place + j * step) % len(frame)
+        down, across = row - frame[n] // width, column - frame[n] % width
+        weight = _line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across)
+        total += weight
+        red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
+        green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))
+        blue += weight * (means[k, n, 2] + part * (means[k + 1, n, 2] - means[k, n, 2]))
+    # The other colours have a weight of 1.
+    rest = 1.0 / (1.0 + total)
+    color[0], color[1], color[2] = rest * (color[0] + red), rest * (color[1] + green), rest * (color[2] + blue)

@@ -77,9 +77,11 @@ def find_candidates(
     )
     arrays, no_steep = rays.arrays, np.zeros_like(rays.steep)
     for k, (t, s) in enumerate(rays.to_view(offset)):
-        needed = np.flatnonzero(land_rough(arrays, k, t, s, rows, splat))
+        needed = np.zeros_like(no_steep)
+        land_rough(arrays, k, (t, s), first_row // CELL_PX, splat, needed)
         # Only the photo has steep surfaces.
-        _land_rays(arrays, k, (rays.joined, no_steep if k else rays.steep), needed, columns, (t, s), found)
+        steepness = rays.joined, no_steep if k else rays.steep
+        _land_rays(arrays, k, steepness, np.flatnonzero(needed), columns, (t, s), found)
     _mean_disparity(found, splat)
     backward_warp(arrays.disparity[0], offset, about, found)
     return found

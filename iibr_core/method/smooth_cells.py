@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.method.rays import CELL_PX, RayArrays, RaySet
+from iibr_core.method.rays import CELL_PX, RaySet
 from iibr_core.runtime.kernels import kernel
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset
@@ -50,15 +50,6 @@ def cells_in(columns: tuple[int, int], shape: tuple[int, int]) -> NDArray[np.boo
     inside = np.zeros(shape, np.bool_)
     inside[:, columns[0] // CELL_PX : -(-columns[1] // CELL_PX)] = True
     return inside
-
-
-def land_rough(
-    rays: RayArrays, k: int, t: float, s: float, rows: tuple[int, int], splat: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Return which cells (M, N) of source k, t and s away, may land on a cell of these rows that is to be splatted."""
-    needed = np.zeros(rays.low.shape[1:], np.bool_)
-    _land_rough(rays, k, t, s, rows[0] // CELL_PX, splat, needed)
-    return needed
 
 
 @kernel
@@ -105,7 +96,12 @@ def _land_cells(rays, rough, offsets, first_cell, parallax, ranges, smooth):
 
 
 @kernel
-def _land_rough(rays, k, t, s, first_cell, splat, needed):
+def land_rough(rays, k, to_view, first_cell, splat, needed):
+    """Mark in needed (M, N) the cells of source k that may land on a cell that is to be splatted.
+
+    to_view: (t, s) from the source. splat: cells of the view from row `first_cell` on.
+    """
+    t, s = to_view
     low, high, (rows, columns) = rays.low[k], rays.high[k], splat.shape
     for v in range(len(low)):
         least, most = np.float64(rays.row_ranges[k, v, 0]), np.float64(rays.row_ranges[k, v, 1])

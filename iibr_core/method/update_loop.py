@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from iibr_core.method.rays import RaySet
-from iibr_core.method.view import Renderer, View, add_new_rays
+from iibr_core.method.view import Renderer, View
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import ViewOffset
 
@@ -17,5 +17,6 @@ def update(rays: RaySet, farthest: Iterable[ViewOffset], renderer: Renderer) -> 
     """Yield each of these views with its offset, in order, after what was inpainted there has joined the rays."""
     for offset in farthest:
         view = renderer.render(rays, offset, THREADS, reopens=True)
-        add_new_rays(rays, offset, view)
+        if view.behind is not None or view.occluded.any():
+            rays.add(offset, view.colors, view.disparity, view.occluded, view.behind)
         yield offset, view

@@ -43,11 +43,6 @@ class View:
     inpainted: NDArray[np.bool_]
     behind: RaysBehind | None = None
 
-    @property
-    def has_new_rays(self) -> bool:
-        """Whether anything was inpainted here."""
-        return self.behind is not None or bool(self.occluded.any())
-
 
 @dataclass(frozen=True)
 class Renderer:
@@ -62,7 +57,7 @@ class Renderer:
         threads: number of row bands side by side; it does not change the result. reopens: whether what other views
         inpainted is inpainted again here where it shows through a hole in one of the photo's surfaces.
         """
-        view, covered, decided = self._closed_form(rays, offset, threads)
+        view, covered, decided = self.visible(rays, offset, threads)
         # Filled before the transformer's choice is written: the closed form's disparity is smoother, so are the holes.
         view = self._fill(rays, offset, view, covered, threads, reopens)
         _write(decided, view)
@@ -70,14 +65,10 @@ class Renderer:
             _mark_outside_frame(view.disparity, *map(float, offset), view.inpainted)
         return view
 
-    def visible(self, rays: RaySet, offset: ViewOffset, threads: int = 1) -> tuple[View, FloatImage]:
-        """Return the view at `offset` with open holes, and how much of each ray is covered (H, W)."""
-        view, covered, decided = self._closed_form(rays, offset, threads)
-        _write(decided, view)
-        return view, covered
-
-    def _closed_form(self, rays: RaySet, offset: ViewOffset, threads: int) -> tuple[View, FloatImage, list[_Decided]]:
-        """Return the view with open holes, how much of each ray is covered, and the choices of the transformer."""
+    def visible(self, rays: RaySet, offset: ViewOffset, threads: int = 1) -> tuple[View, FloatImage, list[Decided]]:
+        """Return the closed form's view at `offset` with open holes, how much of each ray is covered (H, W), and the
+        choices of the transformer.
+        """
         size = rays.view_size
         view = View(
             np.empty((*size, 3), np.float32),
@@ -87,14 +78,14 @@ class Renderer:
         )
         covered = np.empty(size, np.float32)
 
-        def band(first: int, last: int) -> _Decided | None:
+        def band(first: int, last: int) -> Decided | None:
             return self._render_rows(rays, offset, (first, last), view, covered)
 
         return view, covered, [decided for decided in in_bands(band, size, threads) if decided is not None]
 
     def _render_rows(
         self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: View, covered: FloatImage
-    ) -> _Decided | None:
+    ) -> Decided | None:
         """Write rows [first, last) of the view, holes open, and of how much of each ray is covered."""
         around = SEARCH_PX if self.transformer else 0
         # The images are larger than the view: their rows and columns count here.
@@ -121,7 +112,7 @@ class Renderer:
         raise_if_stopped()
         colors, disparity, source = blend(rays, ambiguous, self.transformer(ambiguous))
         y, x = ambiguous.pixel[:, 0] - rays.margins.top, ambiguous.pixel[:, 1] - left
-        return _Decided(y, x, colors, disparity, source >= rays.photo_images)
+        return Decided(y, x, colors, disparity, source >= rays.photo_images)
 
     def _fill(
         self, rays: RaySet, offset: ViewOffset, view: View, covered: FloatImage, threads: int, reopens: bool
@@ -151,7 +142,7 @@ class Renderer:
         return replace(view, behind=behind)
 
 
-class _Decided(NamedTuple):
+class Decided(NamedTuple):
     """The transformer's choice for pixels y, x (N,). colors (N, 3), disparity (N,), inpainted (N,): see `View`."""
 
     y: NDArray[np.int64]
@@ -161,7 +152,7 @@ class _Decided(NamedTuple):
     inpainted: NDArray[np.bool_]
 
 
-def _write(decided: list[_Decided], view: View) -> None:
+def _write(decided: list[Decided], view: View) -> None:
     """Write the transformer's choices where nothing was filled here: reopened holes were open only after it chose."""
     for part in decided:
         chosen = ~view.occluded[part.y, part.x]
@@ -182,12 +173,6 @@ def _reopened(rays: RaySet, offset: ViewOffset, view: View, hole: NDArray[np.boo
         reopened &= continues_in_front(view.disparity, hole | reopened, rays.photo_disparity, offset, threads)
         view.occluded[reopened] = True
     return reopened
-
-
-def add_new_rays(rays: RaySet, offset: ViewOffset, view: View) -> None:
-    """Add what was inpainted in a view to the rays: all later views show the same."""
-    if view.has_new_rays:
-        rays.add(offset, view.colors, view.disparity, view.occluded, view.behind)
 
 
 def finish(rays: RaySet, offset: ViewOffset, view: View, threads: int | None = 1) -> View:
