@@ -17,8 +17,9 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.exports.cameras import cameras_of, nearest_metres
 from iibr_core.exports.kinds import EXPORTS, ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.exports.source import open_for_export, write_export
+from iibr_core.exports.source import ExportSource, open_for_export, write_export
 from iibr_core.exports.triangles import MAX_ERROR_PX, Triangles, triangulate
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -148,27 +149,32 @@ def test_a_mesh_is_the_photo_from_its_place(known, tmp_path) -> None:
         assert -z[inside].min() > 1.2 * metres, "behind the square"
 
 
-def test_a_mesh_has_no_holes_from_the_corner_views(source, tmp_path) -> None:
+def opened(photo: Path | str, max_pixels: int) -> ExportSource:
+    source = Source(str(photo), grid=GridShape(3, 3), max_pixels=max_pixels)
+    return open_for_export(EXPORTS["mesh"], ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
+
+
+def test_a_mesh_of_a_photo_has_no_holes_from_the_corner_views(tmp_path) -> None:
+    source = opened(resource_folder("assets") / "motorcycle" / "motorcycle.png", 20_000)
     meshes, cameras = meshes_of(exported(source, "mesh", tmp_path / "a.glb")), cameras_of(source)
-    finer = 8
+    finer, (width, height) = 4, source.scene.size
     for row, column in ((0, 0), (0, 2), (2, 0), (2, 2)):
         offset = cameras.grid.offset(row, column)
         (left, top, _), centre = cameras.place(offset), cameras.principal_point(offset)
-        covered = np.zeros((64 * finer, 96 * finer), np.uint8)
+        covered = np.zeros((height * finer, width * finer), np.uint8)
         for mesh in meshes:
             x, y, z = mesh.vertices.T
             pixels = np.column_stack([(x - left) / -z, (-y - top) / -z]) * cameras.focal_px + centre
             for triangle in np.rint(pixels * finer).astype(np.int32)[mesh.faces]:
                 cv2.fillConvexPoly(covered, triangle, 1)
-        assert covered.all()
+        assert (covered == 0).sum() < 10
 
 
 def test_a_mesh_has_the_photos_camera_and_its_picture_at_its_own_size(tmp_path) -> None:
-    photo = Source(str(write_scene(tmp_path)), grid=GridShape(3, 3), max_pixels=48 * 32)
-    kind, options = EXPORTS["mesh"], ExportOptions()
-    source = open_for_export(kind, options, photo, 1.0, LensChoice(), lambda scene: None, None)
+    photo = write_scene(tmp_path)
+    source = opened(photo, 48 * 32)
     assert source.scene.size == (48, 32)
-    write_export(kind, tmp_path / "a.glb", source, options)
+    exported(source, "mesh", tmp_path / "a.glb")
     scene = trimesh.load_scene(tmp_path / "a.glb", process=False)
     vertical = math.radians(scene.camera.fov[1])
     assert math.tan(vertical / 2) == pytest.approx(16 / cameras_of(source).focal_px)
@@ -178,4 +184,4 @@ def test_a_mesh_has_the_photos_camera_and_its_picture_at_its_own_size(tmp_path) 
     np.testing.assert_allclose([corners["min"], corners["max"]], [unmoved.min(0), unmoved.max(0)], rtol=1e-5)
     texture = photo_mesh.visual.material.baseColorTexture.convert("RGB")
     assert texture.size == (96, 64)
-    assert np.abs(np.asarray(texture).astype(int) - Image.open(photo.path)).mean() < 2
+    assert np.abs(np.asarray(texture).astype(int) - Image.open(photo)).mean() < 2
