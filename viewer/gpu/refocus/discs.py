@@ -81,6 +81,18 @@ class _Target:
     texel: int
 
 
+@dataclass(frozen=True)
+class _Picture:
+    """A picture through a lens. target: takes it. block_px: side of its blocks. reached: slices whose light comes into
+    each block of the picture and its margin, a bit for each.
+    """
+
+    lens: Lens
+    target: moderngl.Framebuffer
+    block_px: int
+    reached: NDArray[np.uint32]
+
+
 class Discs:
     """Draws pictures through open lenses. Call it only from the thread of its context."""
 
@@ -113,12 +125,12 @@ class Discs:
         region, size_px = ScreenSize(*pinhole.size), ScreenSize(*target.size)
         self._write_taps(lens)
         self._draw_surfaces(field, lens, pinhole, seen, region)
-        block_px = _block_px(lens.slices)
-        reached = self._draw_occupancy(lens, region, block_px)
+        block_px, aspect = _block_px(lens.slices), field.height / field.width
+        picture = _Picture(lens, target, block_px, self._draw_occupancy(lens, region, block_px))
         for top, left in itertools.product(range(0, size_px.height, TILE_PX), range(0, size_px.width, TILE_PX)):
             box = left, top, min(left + TILE_PX, size_px.width), min(top + TILE_PX, size_px.height)
             self._ctx.disable(moderngl.BLEND)
-            self._draw_tile(field, lens, box, target, reached, block_px)
+            self._draw_tile(picture, box, aspect)
             yield
 
     def _draw_surfaces(
@@ -189,26 +201,19 @@ class Discs:
         program.draw()
         return np.frombuffer(self._textures["reach"].read(), np.uint32).reshape(size[::-1])
 
-    def _draw_tile(
-        self,
-        field: LightFieldTexture,
-        lens: Lens,
-        box: Box,
-        target: moderngl.Framebuffer,
-        reached: NDArray[np.uint32],
-        block_px: int,
-    ) -> None:
-        places, sheet, blurred_sheet = _places(lens, box, reached, block_px)
+    def _draw_tile(self, picture: _Picture, box: Box, aspect: float) -> None:
+        """Draw a tile. aspect: height / width of the field."""
+        places, sheet, blurred_sheet = _places(picture, box)
         self._texture("slices", sheet, 4, "f2")
         self._texture("blurred", blurred_sheet, 4, "f2")
         self._textures["occupancy"].use(BLOCKS)
-        self._draw_slices(lens, places, block_px)
+        self._draw_slices(picture, places)
         self._textures["reach"].use(BLOCKS)
-        self._blur_slices(lens, places, box, target, field, block_px)
-        self._composite(lens, places, box, target, block_px)
+        self._blur_slices(picture, places, aspect)
+        self._composite(picture, places, box)
 
-    def _draw_slices(self, lens: Lens, places: list[_Place], block_px: int) -> None:
-        framebuffer, tents = self._framebuffer("slices"), _tents(lens.slices)
+    def _draw_slices(self, picture: _Picture, places: list[_Place]) -> None:
+        framebuffer, tents = self._framebuffer("slices"), _tents(picture.lens.slices)
         clear(framebuffer)
         program = self._programs.get("slice.frag", vertex="blocks.vert")
         width, height = self._textures["light"].size
@@ -216,18 +221,11 @@ class Discs:
         for place in places:
             program.set_uniforms(tent=tents[place.index], origin=place.origin, corner=place.source, texel=place.texel)
             target = _Target(place.source, place.size, place.origin, place.texel)
-            self._draw_blocks(program, framebuffer, target, 1 << place.index, block_px)
+            self._draw_blocks(program, framebuffer, target, 1 << place.index, picture.block_px)
 
-    def _blur_slices(
-        self,
-        lens: Lens,
-        places: list[_Place],
-        box: Box,
-        target: moderngl.Framebuffer,
-        field: LightFieldTexture,
-        block_px: int,
-    ) -> None:
-        framebuffer, is_cat_eye = self._framebuffer("blurred"), lens.optics.aperture_shape.kind == "cat_eye"
+    def _blur_slices(self, picture: _Picture, places: list[_Place], aspect: float) -> None:
+        lens, framebuffer = picture.lens, self._framebuffer("blurred")
+        is_cat_eye = lens.optics.aperture_shape.kind == "cat_eye"
         clear(framebuffer)
         program = self._programs.get("disc.frag", {"CAT_EYE": is_cat_eye}, vertex="blocks.vert")
         self._textures["slices"].use(ATLAS)
@@ -237,24 +235,23 @@ class Discs:
             shift = tuple(place.source[i] + place.pad - place.target[i] for i in (0, 1))
             program.set_uniforms(tap_count=len(place.slice.taps), shift=shift)
             if is_cat_eye:
-                aspect = field.height / field.width * lens.field_part.width / lens.field_part.height
-                _set_barrel(program, lens, place, ScreenSize(*target.size), aspect)
+                whole = aspect * lens.field_part.width / lens.field_part.height
+                _set_barrel(program, lens, place, ScreenSize(*picture.target.size), whole)
             blurred = _Target(place.target, place.blurred_size, place.first, place.texel)
-            self._draw_blocks(program, framebuffer, blurred, 1 << place.index, block_px)
+            self._draw_blocks(program, framebuffer, blurred, 1 << place.index, picture.block_px)
 
-    def _composite(
-        self, lens: Lens, places: list[_Place], box: Box, target: moderngl.Framebuffer, block_px: int
-    ) -> None:
+    def _composite(self, picture: _Picture, places: list[_Place], box: Box) -> None:
         left, top, right, bottom = box
-        program, margin = self._programs.get("composite.frag", vertex="blocks.vert"), lens.margin_px
+        program, margin = self._programs.get("composite.frag", vertex="blocks.vert"), picture.lens.margin_px
         self._textures["blurred"].use(ATLAS)
         table = [(0.0, 0.0, 0.0, 0.0)] * MAX_SLICES
         for place in places:
             x, y = (place.target[i] + (margin - place.first[i]) / place.texel for i in (0, 1))
             table[place.index] = (x, y, 1 / place.texel, 0.0)
         program.set_uniforms(atlas=ATLAS, places=table)
-        picture = _Target((left, top), (right - left, bottom - top), (left + margin, top + margin), 1)
-        self._draw_blocks(program, target, picture, (1 << len(lens.slices)) - 1, block_px)
+        target = _Target((left, top), (right - left, bottom - top), (left + margin, top + margin), 1)
+        wanted = (1 << len(picture.lens.slices)) - 1
+        self._draw_blocks(program, picture.target, target, wanted, picture.block_px)
 
     def _draw_blocks(
         self,
@@ -360,17 +357,13 @@ def _tents(slices: tuple[Slice, ...]) -> list[tuple[float, float, float, float]]
     return tents
 
 
-def _places(
-    lens: Lens, box: Box, reached: NDArray[np.uint32], block_px: int
-) -> tuple[list[_Place], tuple[int, int], tuple[int, int]]:
-    """Return the places of the slices that a tile shows, and the sizes of both textures.
-
-    reached: slices whose light comes into each block of the picture and its margin, a bit for each.
-    """
+def _places(picture: _Picture, box: Box) -> tuple[list[_Place], tuple[int, int], tuple[int, int]]:
+    """Return the places of the slices that a tile shows, and the sizes of both textures."""
+    lens, block_px = picture.lens, picture.block_px
     shelves, blurred_shelves, places = _Shelves(), _Shelves(), []
     left, top, right, bottom = (each + lens.margin_px for each in box)
     first = left // block_px, top // block_px
-    tile = reached[first[1] : -(-bottom // block_px), first[0] : -(-right // block_px)]
+    tile = picture.reached[first[1] : -(-bottom // block_px), first[0] : -(-right // block_px)]
     for index, each in enumerate(lens.slices):
         there = (tile >> index & 1).astype(bool)
         if not there.any():
