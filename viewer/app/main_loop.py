@@ -35,7 +35,7 @@ from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, Picture, SceneView
 from viewer.gpu.context import create_for_window
-from viewer.model import gesture, inspection, opening, preferences, saving, selection, viewpoint, window
+from viewer.model import inspection, opening, preferences, saving, selection, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.app_state import AppState
 from viewer.model.inspection import NO_INSPECTION_TEXTURES
@@ -133,7 +133,7 @@ class App:
         self._pointer = pointer = read_pointer(self._pointer)
         if pointer.step_x or pointer.step_y:
             self._pace.pointer_moved_at = time.perf_counter()
-        actions = [do(gesture.end_gesture)] if pointer.is_pressed and self.state.history.gesture else []
+        actions = [do(window.end_gesture)] if pointer.is_pressed and self.state.history.gesture else []
         paths = filmstrip_paths(self.state, layout) + recent_paths(self.state) + browsed_paths(self.state)
         thumbnails = self._filmstrip.thumbnails(paths)
         sharp = self.sharpener.texture(picture) if picture else None
@@ -244,7 +244,7 @@ class App:
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
         actions += actions_from_keys(read_keys(self.window.held_at), self.state)
-        actions += [do(gesture.end_gesture)] if pointer.is_released else []  # after the edits of the frame
+        actions += [do(window.end_gesture)] if pointer.is_released else []  # after the edits of the frame
         return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 
     def _gloss_request(self, state: AppState) -> GlossRequest | None:

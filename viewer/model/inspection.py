@@ -146,13 +146,6 @@ def move_divider(state: AppState, place: float) -> AppState:
     return replace(state, inspection=replace(state.inspection, divider=divider, divider_taken=True))
 
 
-def release_divider(state: AppState) -> AppState:
-    """Let go of the divider."""
-    if not state.inspection.divider_taken:
-        return state
-    return replace(state, inspection=replace(state.inspection, divider_taken=False))
-
-
 def set_hover(state: AppState, hover: Hover | None) -> AppState:
     """Set the pointer's place in the picture; None: it is elsewhere, and the values under it are gone."""
     if hover is None:

@@ -1,10 +1,11 @@
-"""Verbs about the window: full screen, the panel, and the report of the last drawing; its layout."""
+"""Verbs about the window and its pointer: full screen, the panel, and the report of the last drawing; its layout."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 from iibr_core.scenes.screen_size import ScreenSize
+from viewer.model import depth
 from viewer.model.action import Setter, setter
 from viewer.model.app_state import AppState
 from viewer.model.inspection import beside_of
@@ -42,6 +43,16 @@ set_narrow: Setter[bool] = setter("is_narrow")
 """Note whether the window is too narrow for a panel beside the picture."""
 set_report: Setter[DrawReport | None] = setter("report")
 """Note how the last picture was drawn."""
+
+
+def end_gesture(state: AppState) -> AppState:
+    """Release handles, divider and stroke, as the pointer does: the next step is another edit, for undo."""
+    state = depth.end_stroke(state)
+    if state.inspection.divider_taken:
+        state = replace(state, inspection=replace(state.inspection, divider_taken=False))
+    if state.tilt_handles is not None and state.tilt_handles.taken is not None:
+        state = replace(state, tilt_handles=replace(state.tilt_handles, taken=None))
+    return replace(state, history=replace(state.history, gesture="")) if state.history.gesture else state
 
 
 def layout_for(state: AppState, size: ScreenSize, pixel_ratio: float, ui_scale: float) -> Layout:

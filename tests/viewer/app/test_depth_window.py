@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import FAR, NEAR
-from viewer.model import depth, gesture, lens, messages, saving
+from viewer.model import depth, lens, messages, saving, window
 from viewer.model.action import do
 from viewer.model.browsing import PathPrompt
 from viewer.model.depth import Brush
@@ -134,7 +134,7 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer):
     # where `find` looks
     viewer.app.do(
         do(depth.set_tone, replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True),
-        do(gesture.end_gesture),
+        do(window.end_gesture),
     )
     until_made(viewer, 3)
     x, y = viewer.find("handle near_clip")

@@ -17,7 +17,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import shows, write_scene
-from viewer.model import depth, gesture, lens, messages, opening, saving
+from viewer.model import depth, lens, messages, opening, saving, window
 from viewer.model.action import do
 from viewer.model.saving import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
 from viewer.model.tasks import CancelJobTask, ExportTask, SaveTask, ask
@@ -103,7 +103,7 @@ def nine_changes(viewer, folder):
         (do(lens.set_focus_tilt, (0.5, 0.2)),),
         (do(lens.set_gloss, Gloss()),),
         (do(lens.set_depth_strength, 0.6, is_finished=True),),
-        (do(depth.paint, (0.5, 0.5)), do(depth.paint, (0.7, 0.5)), do(gesture.end_gesture)),
+        (do(depth.paint, (0.5, 0.5)), do(depth.paint, (0.7, 0.5)), do(window.end_gesture)),
         (do(depth.set_tone, DepthEdits(gamma=1.7), is_finished=True),),
         (do(opening.open_source, replace(source, grid=GridShape(5, 5))),),
         (other_photo(folder),),

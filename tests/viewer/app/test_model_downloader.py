@@ -15,7 +15,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import local_hub
 from viewer.background.depth_models import OFFLINE
-from viewer.model import depth, depth_models, gesture, history, lens, opening, preferences
+from viewer.model import depth, depth_models, history, lens, opening, preferences, window
 from viewer.model.action import do
 from viewer.model.depth import Brush
 from viewer.model.depth_models import offered_model
@@ -90,10 +90,10 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer, hub):
     assert not hub.asked, "nothing is fetched unasked"
     at = place_of(50, 20, viewer.app.state.scene)
     before = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
-    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, -0.5)), do(gesture.end_gesture))
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, -0.5)), do(window.end_gesture))
     viewer.app.do(do(lens.focus_on, at, before or 0.0), do(lens.set_aperture, 1.0))
     viewer.app.do(do(depth.set_brush, Brush(radius=0.1, strength=1.0)), do(depth.paint, (0.1, 0.9)))
-    viewer.do(do(gesture.end_gesture))
+    viewer.do(do(window.end_gesture))
     edits = viewer.app.state.depth.edits
     assert wall_slope(viewer) > 0.5, "a guess has what is low near"
     viewer.press(GET, "notices", until=lambda app: app.state.models.downloading is not None)
@@ -210,7 +210,7 @@ def test_a_model_file_of_ones_own_is_used_in_place_and_a_broken_one_leaves_the_d
     viewer.settle(lambda app: any(notice.is_error for notice in app.state.notices))
     assert depth_kind(viewer.app) == "rough"
     file = weighing(tmp_path / "own.onnx", (1, 1, 1))
-    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(gesture.end_gesture))
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(window.end_gesture))
     viewer.app.do(do(depth_models.use_model, str(file)))
     viewer.until(is_deep)
     assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.5)
@@ -247,7 +247,7 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     first.until(lambda app: bool(list((kept / "sessions").glob("*.json"))))
     at = place_of(50, 20, first.app.state.scene)
     sharp = first.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
-    first.do(do(lens.focus_on, at, sharp or 0.0), do(gesture.end_gesture))
+    first.do(do(lens.focus_on, at, sharp or 0.0), do(window.end_gesture))
     left = first.app.state.optics
     first.app.do(do(depth_models.use_model, MODEL.name))  # chosen for all photos, but it never comes
     first.app.close()

@@ -12,7 +12,7 @@ from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import shows, write_scene
-from viewer.model import depth, gesture, inspection, lens, opening, selection, viewpoint
+from viewer.model import depth, inspection, lens, opening, selection, viewpoint, window
 from viewer.model.action import do
 from viewer.model.depth import DepthSample
 from viewer.model.layout import Zoom
@@ -49,7 +49,7 @@ def everything(driver):
 
     change(do(depth.set_tone, replace(UNEDITED, gamma=1.5), is_finished=True))
     brush = replace(driver.app.state.brush, is_on=True, radius=0.2)
-    change(do(depth.set_brush, brush), do(depth.paint, (0.4, 0.5)), do(gesture.end_gesture))
+    change(do(depth.set_brush, brush), do(depth.paint, (0.4, 0.5)), do(window.end_gesture))
     change(do(depth.set_brush, replace(brush, tool="level")), do(depth.pick, DepthSample((0.5, 0.5), 1.0)))
     change(do(depth.set_brush, replace(brush, is_on=False)), do(selection.select, (0.5, 0.5)))
     change(do(lens.set_depth_strength, 1.5, is_finished=True), do(lens.focus_on, (0.5, 0.5), 0.5))

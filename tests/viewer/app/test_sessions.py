@@ -17,7 +17,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import DEADLINE_S, rests, says
 from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
-from viewer.model import depth, gesture, history, lens
+from viewer.model import depth, history, lens, window
 from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
 from viewer.model.saving import SavedSettings
@@ -38,7 +38,7 @@ def change(driver):
     app.do(do(lens.move_eye, ViewOffset(0.3, -0.2)), do(lens.set_aperture, 1.5), do(lens.set_focus, 0.25))
     app.do(do(depth.set_tone, replace(UNEDITED, gamma=1.5), is_finished=True))
     app.do(
-        do(depth.set_brush, replace(app.state.brush, is_on=True)), do(depth.paint, (0.5, 0.5)), do(gesture.end_gesture)
+        do(depth.set_brush, replace(app.state.brush, is_on=True)), do(depth.paint, (0.5, 0.5)), do(window.end_gesture)
     )
     driver.until_idle()
 
@@ -153,7 +153,7 @@ def test_many_strokes_are_painted_beside_the_window(open_window, photo_path, tmp
     app = driver.app
     app.do(do(depth.set_brush, replace(app.state.brush, is_on=True)), do(depth.paint, (0.5, 0.5)))
     driver.until(lambda app: len(painted_here) > 0)
-    app.do(do(gesture.end_gesture))
+    app.do(do(window.end_gesture))
     driver.settle(lambda app: app.state.shown_generation == app.state.generation)
     assert len({stroke.points[0] for stroke in painted_here}) == 1
     loaded = app.scene_view.loaded

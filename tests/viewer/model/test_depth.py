@@ -22,7 +22,7 @@ from iibr_core.types import GridShape
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.model import depth, gesture, history, inspection, lens, opening, saving, selection
+from viewer.model import depth, history, inspection, lens, opening, saving, selection, window
 from viewer.model.action import do
 from viewer.model.carried_optics import NewDepth
 from viewer.model.commands import action_for_path
@@ -63,7 +63,7 @@ def test_a_stroke_keeps_points_that_lie_apart():
     state = opened()
     for place in ((0.1, 0.1), (0.101, 0.1), (0.3, 0.1)):
         state = depth.paint(state, place)
-    drawn = gesture.end_gesture(state)
+    drawn = window.end_gesture(state)
     assert drawn.depth.edits.strokes == (Stroke("nearer", ((0.1, 0.1), (0.3, 0.1)), 0.06, Brush().strength),)
 
 
@@ -94,7 +94,7 @@ def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_
 
 
 def test_the_same_scene_planned_anew_keeps_its_edits_until_they_are_undone_or_reset():
-    edited = gesture.end_gesture(depth.set_tone(opened(), TONE, True))
+    edited = window.end_gesture(depth.set_tone(opened(), TONE, True))
     again = replace(edited.scene, plan=plan_of(GRID, scale=0.5))
     state = opening.show_scene(edited, edited.generation, again)
     assert state.depth == edited.depth

@@ -8,7 +8,7 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
-from viewer.model import gesture, history, lens, opening
+from viewer.model import history, lens, opening, window
 from viewer.model.action import do
 from viewer.model.presets import active_preset
 
@@ -30,7 +30,7 @@ def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted):
     start = state_with(scene_of())
     state, seen = start, [start.optics]
     for edit in wanted:
-        state = after(state, edit, do(gesture.end_gesture))
+        state = after(state, edit, do(window.end_gesture))
         if state.optics != seen[-1]:
             seen.append(state.optics)
     back = state
@@ -48,9 +48,9 @@ def test_a_drag_is_one_edit():
     start = lens.set_aperture(state_with(scene_of()), 1)
     state = after(
         start,
-        do(gesture.end_gesture),
+        do(window.end_gesture),
         *(do(lens.move_eye, ViewOffset(0, 0.1 * i)) for i in range(1, 20)),
-        do(gesture.end_gesture),
+        do(window.end_gesture),
     )
     assert len(state.history.past) == 2
     assert history.undo(state).optics == start.optics
@@ -66,7 +66,7 @@ def test_undoing_depth_strength_makes_the_field_anew():
         state_with(scene_of()),
         do(lens.set_depth_strength, 2, False),
         do(lens.set_depth_strength, 3, True),
-        do(gesture.end_gesture),
+        do(window.end_gesture),
     )
     assert len(state.history.past) == 1
     undone = history.undo(state)
@@ -81,11 +81,11 @@ def test_edits_before_another_plan_are_undone_in_its_units():
     state = after(
         state_with(scene_of(plan=old)),
         do(lens.set_focus, 1.0),
-        do(gesture.end_gesture),
+        do(window.end_gesture),
         do(lens.set_focus, 0.25),
-        do(gesture.end_gesture),
+        do(window.end_gesture),
     )
-    state = after(state, do(lens.set_depth_strength, 2.0, True), do(gesture.end_gesture))
+    state = after(state, do(lens.set_depth_strength, 2.0, True), do(window.end_gesture))
     state = opening.show_scene(state, state.generation, scene_of(plan=new))
     assert state.optics.focus_disparity == pytest.approx(0.5)
     state = history.undo(state)
@@ -98,9 +98,9 @@ def test_undoing_depth_strength_brings_the_aperture_and_its_preset_back():
     """Discs stay as wide as they are, so the aperture follows the depth."""
     few, many = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(13, 13), scale=1.0)
     before = scene_of(plan=few)
-    state = after(state_with(before), do(lens.apply_preset, "portrait"), do(gesture.end_gesture))
+    state = after(state_with(before), do(lens.apply_preset, "portrait"), do(window.end_gesture))
     wanted = state.optics.aperture_diameter
-    state = after(state, do(lens.set_depth_strength, 2.0, True), do(gesture.end_gesture))
+    state = after(state, do(lens.set_depth_strength, 2.0, True), do(window.end_gesture))
     wider = scene_of(GridShape(13, 13), plan=many, disparity_range_px=(-4.0, 6.0))
     state = opening.show_scene(state, state.generation, wider)
     assert state.optics.aperture_diameter == pytest.approx(wanted / 2)

@@ -9,7 +9,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
-from viewer.model import gesture, inspection, opening
+from viewer.model import inspection, opening, window
 from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
 from viewer.model.inspection import Hover, Inspection, Probe, sheet_cells, view_at, view_near
@@ -43,7 +43,7 @@ def test_opacity_and_divider_are_held_within_the_picture():
     held = inspection.move_divider(OPEN, 5)
     assert 0.9 < held.inspection.divider < 1
     assert held.inspection.divider_taken
-    assert not gesture.end_gesture(held).inspection.divider_taken
+    assert not window.end_gesture(held).inspection.divider_taken
 
 
 @pytest.mark.parametrize("kind", ["entropy", "inpainted"])

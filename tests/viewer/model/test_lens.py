@@ -20,7 +20,7 @@ from iibr_core.scenes.lens_limits import (
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
-from viewer.model import depth, gesture, history, lens, look, opening
+from viewer.model import depth, history, lens, look, opening, window
 from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.carried_optics import carry_optics
@@ -164,7 +164,7 @@ def test_dragging_a_handle_is_one_edit_and_lets_go_at_the_end():
     assert sharp_disparity(state.optics, (-0.8, 0.6)) == pytest.approx(2.5)
     state = lens.move_tilt_handle(state, 0, (-0.9, 5.0), None)
     assert state.tilt_handles.first == (-0.9, 1.0), "held within the picture"
-    state = gesture.end_gesture(state)
+    state = window.end_gesture(state)
     assert state.tilt_handles.taken is None
     assert len(state.history.past) == 1
     clicked = lens.focus_on(state, (0.9, 0.9), 0.3)
@@ -178,9 +178,9 @@ def test_a_stroke_is_one_edit_and_skips_places_that_are_close():
     brush, state = GlossBrush(radius=0.1, is_on=True), lens.set_gloss(state_with(scene_of()), FIRST_GLOSS)
     for x, begins in ((0.2, True), (0.201, False), (0.3, False)):
         state = lens.paint_gloss(state, (x, 0.5), brush, begins)
-    state = gesture.end_gesture(state)
+    state = window.end_gesture(state)
     assert [stroke.points for stroke in state.optics.gloss.surface.strokes] == [((0.2, 0.5), (0.3, 0.5))]
-    another = gesture.end_gesture(lens.paint_gloss(state, (-7.0, 3.5), brush, True))
+    another = window.end_gesture(lens.paint_gloss(state, (-7.0, 3.5), brush, True))
     assert another.optics.gloss.surface.strokes[1].points == ((-1.0, 2.0),), "as far beside the picture as files allow"
     assert history.undo(another).optics == state.optics
     assert history.undo(history.undo(another)).optics.gloss == FIRST_GLOSS
@@ -253,7 +253,7 @@ def test_a_look_is_given_to_another_photo_with_its_own_focus_and_strokes():
         do(lens.set_gloss, FIRST_GLOSS),
         do(depth.set_tone, DepthEdits(gamma=1.5), is_finished=True),
         do(depth.paint, (0.5, 0.5)),
-        do(gesture.end_gesture),
+        do(window.end_gesture),
         do(lens.set_depth_strength, 2.0, True),
         do(look.copy_look),
         do(opening.open_source, Source("b.png")),
@@ -261,7 +261,7 @@ def test_a_look_is_given_to_another_photo_with_its_own_focus_and_strokes():
     assert state.depth.edits.strokes
     other = scene_of(GridShape(5, 5), state.source, plan=plan_of(GridShape(5, 5)), disparity_range_px=(-1.0, 1.5))
     before = after(state, do(opening.show_scene, state.generation, other), do(lens.set_focus, 1.0))
-    before = after(before, do(depth.paint, (0.2, 0.2)), do(gesture.end_gesture))
+    before = after(before, do(depth.paint, (0.2, 0.2)), do(window.end_gesture))
     state = after(before, do(look.paste_look))
     wanted = replace(before.optics, aperture_diameter=3.6, focus_range=0.6, exposure_stops=1.0, highlight_recovery=0.5)
     assert state.optics == replace(wanted, aperture_shape=ring), "half open, too; the rest is its own"

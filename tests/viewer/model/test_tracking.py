@@ -15,7 +15,7 @@ from iibr_core.scenes.lens_limits import clamp_eye
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_opening import grids, scene_of, state_with
-from viewer.model import gesture, history, lens, opening, tracking, viewpoint
+from viewer.model import history, lens, opening, tracking, viewpoint, window
 from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.tracking import HEAD_RANGE_LIMITS, address_of, eye_of, head_in, offset_of, smooth
@@ -153,7 +153,7 @@ def test_home_makes_the_present_place_the_centre():
 
 
 def test_undo_of_a_focus_does_not_move_the_centre():
-    state = lens.set_focus(gesture.end_gesture(tracked(0j, 3 + 0j)), 0.5)
+    state = lens.set_focus(window.end_gesture(tracked(0j, 3 + 0j)), 0.5)
     state = followed(history.undo(followed(state, 9 + 0j)), 9 + 0j)
     assert state.optics.focus_disparity == 0
     assert state.optics.eye == tracked(0j, 9 + 0j).optics.eye

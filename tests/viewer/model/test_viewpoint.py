@@ -13,7 +13,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model import gesture, history, lens, opening, saving, viewpoint
+from viewer.model import history, lens, opening, saving, viewpoint, window
 from viewer.model.action import do
 from viewer.model.app_state import AppState
 from viewer.model.viewpoint import FORWARD_LIMITS, HOME_S, MAX_ASIDE, MAX_STEP_S, RACK_S, SPEED_LIMITS, FreeCamera
@@ -76,7 +76,7 @@ def test_a_double_click_takes_back_the_focus_of_its_first_click_and_no_earlier_o
     home = ticked(viewpoint.return_home(clicked, takes_back_click=True), 1.0)[-1]
     assert (home.optics.eye, home.optics.focus_disparity) == (CENTRE, 1.0)
     assert history.undo(home).optics == start.optics
-    twice = viewpoint.return_home(lens.focus_on(gesture.end_gesture(clicked), (0.0, 0.0), -1.0), True)
+    twice = viewpoint.return_home(lens.focus_on(window.end_gesture(clicked), (0.0, 0.0), -1.0), True)
     assert twice.optics.focus_disparity == -1.0, "it was sharp before"
     assert viewpoint.return_home(clicked).optics.focus_disparity == -1.0, "by its key"
 
