@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.patch_synthesis import MAX_TEXTURE
 from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.plan import plan_for_viewing, plan_literal
 from iibr_core.method.rays import rays_of_photo
@@ -98,17 +96,6 @@ def test_view_offset_far_outside_the_grid(far):
         assert np.isfinite(view.disparity).all()
         assert (view.occluded == square).all()
         assert np.abs(view.colors - photo.pixels)[~square].max() <= 0.05
-
-
-def test_a_hole_that_covers_the_whole_frame_border_is_filled_from_inside():
-    photo, hole = plain_photo(), np.ones((HEIGHT, WIDTH), np.bool_)
-    hole[4:-4, 4:-4] = False
-    colors, filled = np.where(hole[..., None], 0, photo.pixels), np.where(hole, 0, np.float32(1.0))
-    fill_background(colors, filled, hole, np.ones_like(filled), ViewOffset(2.0, 2.0))
-    inside = photo.pixels[~hole]
-    assert (colors >= inside.min(axis=0) - MAX_TEXTURE - 1e-6).all()
-    assert (colors <= inside.max(axis=0) + MAX_TEXTURE + 1e-6).all()
-    assert filled == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("upright", [True, False])

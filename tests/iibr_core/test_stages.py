@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.edges.refine import refine
-from iibr_core.evaluation.evaluate import Options
 from iibr_core.method.light_field import ViewMaker
 from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.view import Renderer, finish
@@ -60,13 +59,6 @@ def views(case: str, stages: Stages) -> FloatImage:
 def test_a_stage_that_is_left_out_changes_views(stage) -> None:
     case = CASES.get(stage, "exact")
     assert (views(case, replace(ALL_STAGES, **{stage: False})) != views(case, ALL_STAGES)).any()
-
-
-def test_all_stages_are_on_by_default() -> None:
-    assert all(getattr(Stages(), stage.name) for stage in fields(Stages))
-    assert Options().stages == ALL_STAGES
-    photo, values = scene("soft")
-    np.testing.assert_array_equal(refine(photo, values), refine(photo, values, stages=Stages()))
 
 
 def test_views_are_those_that_the_transformer_decides_without_flying_pixels() -> None:

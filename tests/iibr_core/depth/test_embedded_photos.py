@@ -63,6 +63,7 @@ def test_huawei_maps_lie_as_the_phone_was_held(tmp_path, orientation, stored, wh
     stored = stored if white_is_near else 255 - stored
     found = opened(tmp_path, "a.jpg", files.huawei_jpeg(PHOTO, stored, orientation))
     assert_disc_is_nearest(found)
+    assert found.origin.near == ("white" if white_is_near else "black")
     assert any("counts as near" in note for note in found.disparity.notes)
 
 

@@ -65,16 +65,6 @@ def test_a_wild_value_changes_no_other() -> None:
     np.testing.assert_allclose(found, expected, atol=0.01 * np.ptp(expected))
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, -1e30, 3e38])
-def test_a_constant_map_is_flat_and_so_is_rounding(value) -> None:
-    values = np.full((5, 6), value, np.float32)
-    values[0, 0] = np.nan
-    found = disparity(values)
-    assert np.isnan(found[0, 0])
-    assert not found.ravel()[1:].any()
-    assert not disparity(np.float32(1e6) + np.tile(np.float32([0, 0.0625]), (8, 8))).any()
-
-
 @settings(max_examples=20)
 @given(
     hnp.arrays(np.float32, st.tuples(st.integers(0, 8), st.integers(1, 8)), elements=st.floats(width=32)),

@@ -6,8 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from iibr_core.depth.geodesic import spread_distances
-from iibr_core.depth.guess import PIXEL_COST, box_filter, guess_depth
+from iibr_core.depth.guess import PIXEL_COST, box_filter, guess_depth, size_within
 from iibr_core.depth.subject import subject_disparity
+from iibr_core.types import ImageSize
 from tests.iibr_core.scenes import photo_of, square_before_wall
 
 
@@ -50,6 +51,7 @@ def test_what_stands_out_before_a_wall_is_closer_than_the_wall_beside_it() -> No
     rows = slice(50, 70)
     in_front = truth.values[rows] > 1
     assert np.percentile(values[rows][in_front], 10) > np.percentile(values[rows][~in_front], 95)
+    assert size_within(ImageSize(300, 600), 60) == (30, 60), "large photos are guessed at a small size"
 
 
 @settings(max_examples=8)

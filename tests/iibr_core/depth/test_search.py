@@ -13,7 +13,6 @@ from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 from tests.iibr_core.depth.onnx_graphs import of_channels
-from tests.iibr_core.formats.test_view_files import lif
 
 SIZE = ImageSize(48, 72)
 DEPTH = np.full(SIZE, 200, np.uint8)
@@ -117,13 +116,6 @@ def test_damaged_depth_is_followed_by_the_next_with_a_note(depth, tmp_path) -> N
     assert failure in found.disparity.notes
 
 
-def test_a_fault_that_two_sources_meet_is_named_once(tmp_path) -> None:
-    """A Leia image is asked for a map, and for a second view."""
-    (tmp_path / "a.jpg").write_bytes(lif(np.full((*SIZE, 3), 60, np.uint8), b'{"views": [{"picture": 1}]}'))
-    (failure,) = open_with_depth(tmp_path / "a.jpg", start_from("auto")).origin.failures
-    assert "describes its views in an unknown way (no 'image')" in failure
-
-
 @pytest.mark.parametrize(
     ("choice", "message"),
     [(start_from("model"), "v2-small is not on this machine"), (DepthChoice(model="{dir}/empty"), "empty"),
@@ -183,6 +175,8 @@ def test_the_sharp_picture_is_shown(tmp_path) -> None:
     assert found.photo.focal_px == pytest.approx(2 * open_with_depth(photo_file(tmp_path)).photo.focal_px)
     assert any("sharp" in note for note in found.photo.notes)
     assert open_with_depth(photo_file(tmp_path, sharp=files.picture(sharp)), max_pixels=500).photo.pixels.size <= 1500
+    turned = open_with_depth(photo_file(tmp_path, orientation=6, sharp=files.picture(sharp)))
+    assert turned.photo.size == sharp.shape[1::-1], "turned like the photo, as it states nothing itself"
     for bad in (b"no picture", files.grey_photo((50, 50)), files.grey_photo(SIZE)[:300]):
         found = open_with_depth(photo_file(tmp_path, sharp=bad))
         assert (found.photo.size, found.origin.kind) == (SIZE, "embedded")

@@ -6,7 +6,7 @@ import pytest
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options, evaluate
-from iibr_core.evaluation.scenes import find_scenes, read_scene, trial_input, trials_of, warp_disparity
+from iibr_core.evaluation.scenes import find_scenes, read_scene, trial_input, trials_of
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.types import InputError, ViewOffset
@@ -97,11 +97,12 @@ def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path) -> None:
 
 def test_a_map_is_carried_to_the_corner(tmp_path) -> None:
     corner = trials_of(scene_of(write_grid(tmp_path / "square")), "given")[1]
-    assert trial_input(corner, "given", UNREFINED, 10**6).judge.source == "gt_disp_u01_v01.npy, carried over"
+    found = trial_input(corner, "given", UNREFINED, 10**6).judge
+    assert found.source == "gt_disp_u01_v01.npy, carried over"
     wanted = np.full((HEIGHT, WIDTH), WALL, np.float32)
-    top, left = round(HEIGHT / 3 + FOREGROUND), round(WIDTH / 3 - FOREGROUND)
+    top, left = round(HEIGHT / 3 - FOREGROUND), round(WIDTH / 3 + FOREGROUND)
     wanted[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FOREGROUND
-    np.testing.assert_allclose(warp_disparity(disparity_of_square(), ViewOffset(-1.0, 1.0)), wanted, atol=1e-5)
+    np.testing.assert_allclose(found.values, wanted, atol=1e-5)
 
 
 @pytest.mark.parametrize(

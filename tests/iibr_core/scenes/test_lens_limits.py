@@ -16,7 +16,6 @@ from iibr_core.scenes.lens_limits import (
     is_finite,
 )
 from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import (
     Scene,
     SceneReady,
@@ -101,15 +100,6 @@ def test_focusing_opens_a_pinhole_and_other_choices_stay() -> None:
 def test_numbers_that_are_not_finite_are_known(changes) -> None:
     assert is_finite(Optics())
     assert not is_finite(replace(Optics(), **changes))
-
-
-def test_rectangles() -> None:
-    outer = Rect(10.0, 20.0, 40.0, 80.0)
-    assert outer.part(Rect(0.5, 0.25, 0.5, 0.5)) == (30, 40, 20, 40)
-    assert Rect(0.0, 90.0, 20.0, 40.0).within(outer) == (10, 90, 10, 10)
-    assert Rect(60.0, 0.0, 9.0, 9.0).within(outer)[2:] == (0, 0)
-    corners = [(10, 20), (49, 99), (50, 20), (10, 100), (9, 20), (10, 19)]
-    assert [outer.contains(*corner) for corner in corners] == [True, True, False, False, False, False]
 
 
 def test_another_file_or_map_keeps_only_decisions_that_still_make_sense() -> None:

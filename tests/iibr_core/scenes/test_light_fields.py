@@ -40,13 +40,6 @@ def test_a_light_field_without_disparity_finds_its_own(tmp_path) -> None:
         assert view.disparity[8, 8] == pytest.approx(WALL_PX, abs=0.1)
 
 
-def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path) -> None:
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))), takes_drafts=False)
-    ((ready, views),) = showings(results_of(request, lambda: CENTRE))
-    assert ready.scene.has_view_disparity
-    assert {view.view.is_final for view in views} == {True}
-
-
 def test_found_disparity_is_kept_for_the_next_time_until_a_view_changes(tmp_path, monkeypatch) -> None:
     """Then only the views that are wanted are read; names count from right to left, as parallax shows."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

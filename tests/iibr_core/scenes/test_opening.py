@@ -53,6 +53,7 @@ def test_a_large_photo_has_a_sketch(tmp_path) -> None:
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
     assert (sketch.scene.is_sketch, sketch.loaded, sketch.scene.name) == (True, None, whole.scene.name)
     assert sketch.centre.colors.shape == (360, 480, 3)
+    assert sketch.centre.colors.mean() == pytest.approx(whole.centre.colors.mean(), abs=2), "as bright"
     assert (whole.scene.size, whole.scene.is_sketch) == ((1600, 1200), False)
     for changes in ({"max_pixels": 1_499_999}, {"is_literal": True}):
         assert sketch_photo(replace(source, **changes)) is None

@@ -149,16 +149,6 @@ def labelled(photo, given):
     return label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
 
 
-def test_exact_maps_keep_their_bits():
-    photo, truth, _ = square()
-    wild = photo.copy()
-    wild[30, 10:50] = np.nan
-    for colors in (photo, ndimage.uniform_filter(photo, (2, 2, 1)), wild):
-        np.testing.assert_array_equal(labelled(colors, truth), truth)
-    flat = np.ones_like(truth)
-    assert labelled(photo, flat) is flat, "it has no step"
-
-
 @pytest.mark.parametrize("column", [50, 51])
 def test_a_wire_of_a_dilated_map_stays_also_beside_its_place(column):
     photo, truth, _ = square()
@@ -167,12 +157,3 @@ def test_a_wire_of_a_dilated_map_stays_also_beside_its_place(column):
     wire[:, 50] = NEAR
     given = ndimage.maximum_filter(wire, 3) if column == 50 else np.maximum(ndimage.maximum_filter(truth, 3), wire)
     assert (labelled(photo, given)[:, 50] == NEAR).all()
-
-
-@pytest.mark.parametrize("at", [(13, 30), (30, 13), (47, 30), (30, 47)])
-def test_what_is_unknown_goes_where_its_colours_are_as_far_as_the_band_reaches(at):
-    photo, _, given = square()
-    unknown = np.zeros(given.shape, np.bool_)
-    unknown[at], photo[at] = True, photo[30, 30]
-    assert label_edges(photo, given, unknown, EDGE)[at] == NEAR
-    assert labelled(photo, given)[at] == FAR

@@ -5,10 +5,10 @@ import pytest
 from benchmarks.scenes import network_like
 from iibr_core.depth.edges.blur import measure_edge_blur
 from iibr_core.depth.edges.fit import fit_to_blur
-from iibr_core.depth.edges.lone import _find_lone, fill_lone
+from iibr_core.depth.edges.lone import fill_lone
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
-from iibr_core.formats.maps.resample import has_soft_edges, resample_map
+from iibr_core.formats.maps.resample import resample_map
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
@@ -35,17 +35,6 @@ def test_lone_disparities_get_those_of_their_colour():
     assert (np.abs(given - truth) > 1).sum() > 50
     assert (np.abs(filled - truth) > 1).sum() == 0
     assert (holes == (filled != given)).all()
-
-
-def test_a_lone_pixel_is_none_of_its_surfaces_but_a_thin_thing_is_one():
-    values = np.full((40, 40), FAR, np.float32)
-    values[:, 21:] = NEAR
-    values[10, 20] = 5.0
-    lone, between = _find_lone(values, EDGE)
-    assert np.argwhere(lone).tolist() == [[10, 20]]
-    assert between == 1
-    values[11, 20:22] = values[12, 19:22] = values[13:, 19:22] = 5.0
-    assert not _find_lone(values, EDGE)[0].any()
 
 
 SIGMA, FIT_EDGE = 2.0, 0.12
@@ -80,19 +69,6 @@ def test_the_blur_of_a_map_is_measured_unless_it_is_exact_or_too_small(sigma, si
     np.testing.assert_allclose(measure_edge_blur(photo, soft), measured, rtol=0.15)
 
 
-def parts_blurred(*sigmas: float) -> float:
-    """The blur measured on a disc, three times side by side, whose map is blurred differently in each part."""
-    photo, disparity, _ = disc_before_slope(160)
-    maps = [blur(np.tile(disparity, (1, 3)), sigma) if sigma else np.tile(disparity, (1, 3)) for sigma in sigmas]
-    disparity = np.concatenate([values[:, k * 160 : (k + 1) * 160] for k, values in enumerate(maps)], 1)
-    return measure_edge_blur(np.tile(photo, (1, 3, 1)), disparity)
-
-
-def test_a_map_has_the_blur_of_its_soft_edges() -> None:
-    assert parts_blurred(0, 1.5, 2.0) == pytest.approx(1.75, rel=0.2)
-    assert parts_blurred(2.0, 0, 2.0) == pytest.approx(2.0, rel=0.15)
-
-
 def test_an_edge_that_the_photo_does_not_share_proves_nothing() -> None:
     photo, disparity, _ = disc_before_slope(160)
     soft = blur(disparity, 2.0)
@@ -114,16 +90,6 @@ def drawn(seed: int) -> tuple[FloatImage, FloatImage]:
 def soft(exact: FloatImage) -> FloatImage:
     small = cv2.resize(exact, SMALL_SIZE, interpolation=cv2.INTER_AREA)
     return np.asarray(cv2.GaussianBlur(small, (0, 0), 1.2))
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_soft_and_exact_maps_are_told_apart(seed) -> None:
-    exact = drawn(seed)[1]
-    assert has_soft_edges(soft(exact))
-    assert has_soft_edges(cv2.resize(exact, SMALL_SIZE, interpolation=cv2.INTER_AREA))
-    assert not has_soft_edges(cv2.resize(exact, SMALL_SIZE, interpolation=cv2.INTER_NEAREST_EXACT))
-    for value in (np.nan, 0.0, np.inf):
-        assert not has_soft_edges(np.full((9, 9), value, np.float32))
 
 
 def test_a_soft_map_becomes_a_ramp_and_an_exact_one_stays_a_step() -> None:
