@@ -15,7 +15,6 @@ from typing import Literal, get_args
 import numpy as np
 
 from iibr_core.depth.choice import DepthChoice, DepthKind, DepthOrigin
-from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded import photo_in_focus, read_embedded, rotate_estimate, unread_parts
 from iibr_core.depth.estimate import DepthEstimate, disparity_from
@@ -254,7 +253,7 @@ def _with_focal(photo: Photo, estimate: DepthEstimate) -> Photo:
 
 def _at_size(small: FloatImage, width: int, photo: Photo) -> FloatImage:
     """Return a map in px of a picture of this width, at the photo's size in its px."""
-    values = map_at_size(small, photo.size, lies_at_corners(photo.pixels, small))
+    values = map_at_size(small, photo.size)
     return values * np.float32(photo.size.width / width)
 
 

@@ -75,16 +75,13 @@ def scaled_disparity(path: Path, values: FloatImage, scale: float) -> tuple[Floa
     return known, (note,) if count else ()
 
 
-def map_at_size(values: FloatImage, size: ImageSize, is_at_corners: bool = False) -> FloatImage:
-    """Return a map (h, w) at another (height, width), its values unchanged, NaN where little is known.
-
-    is_at_corners: see `resample_map`.
-    """
+def map_at_size(values: FloatImage, size: ImageSize) -> FloatImage:
+    """Return a map (h, w) at another (height, width), its values unchanged, NaN where little is known."""
     if values.shape == size:
         return values
     if MOSTLY_UNKNOWN < np.isnan(values).mean() < 1:
         values = fill_disparity_holes(values)
-    return resample_map(values, size, is_at_corners)
+    return resample_map(values, size)
 
 
 def filling_note(name: str, values: FloatImage) -> tuple[str, ...]:

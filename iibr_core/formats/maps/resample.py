@@ -32,13 +32,10 @@ def nearest_pixels(image: NDArray[Any], size: ImageSize) -> NDArray[Any]:
     return np.ascontiguousarray(image[rows][:, columns])
 
 
-def resample_map(values: FloatImage, size: ImageSize, is_at_corners: bool = False) -> FloatImage:
-    """Return an (H, W) map at another (height, width): a soft map is enlarged smoothly, all others by surfaces.
-
-    is_at_corners: whether its values lie at the upper left corners of its pixels, not in their middles.
-    """
+def resample_map(values: FloatImage, size: ImageSize) -> FloatImage:
+    """Return an (H, W) map at another (height, width): a soft map is enlarged smoothly, all others by surfaces."""
     is_smooth = is_enlarged_smoothly(values, size)
-    return _resampled(values, size, np.inf if is_smooth else SURFACE_SHARE * _range_of(values), is_at_corners)
+    return _resampled(values, size, np.inf if is_smooth else SURFACE_SHARE * _range_of(values))
 
 
 def is_enlarged_smoothly(values: FloatImage, size: ImageSize) -> bool:
@@ -53,7 +50,7 @@ def resample_surfaces(values: FloatImage, size: ImageSize) -> FloatImage:
     Linear interpolation (a tent as wide as the size ratio asks for). Where the footprint spans a depth edge, the
     surface that covers more of it gives the value alone; where more than half of it is unknown, so is the result.
     """
-    return _resampled(values, size, SURFACE_SHARE * _range_of(values), False)
+    return _resampled(values, size, SURFACE_SHARE * _range_of(values))
 
 
 def without_repeats(values: FloatImage) -> FloatImage:
@@ -88,28 +85,25 @@ def _range_of(values: FloatImage) -> float:
     return float(high - low)
 
 
-def _resampled(values: FloatImage, size: ImageSize, tolerance: float, is_at_corners: bool) -> FloatImage:
+def _resampled(values: FloatImage, size: ImageSize, tolerance: float) -> FloatImage:
     result = np.empty(size, np.float32)
-    _resample(np.ascontiguousarray(values, np.float32), tolerance, 0.0 if is_at_corners else 0.5, result)
+    _resample(np.ascontiguousarray(values, np.float32), tolerance, result)
     return result
 
 
 @kernel
-def _resample(values, tolerance, place, result):
-    """Fill result from values; both (H, W), their pixel areas aligned at the borders.
-
-    place: position of the values in their pixels, 0.5 in the middle, 0 at the upper left corner.
-    """
+def _resample(values, tolerance, result):
+    """Fill result from values; both (H, W), their pixel areas aligned at the borders."""
     step_y = values.shape[0] / result.shape[0]
     step_x = values.shape[1] / result.shape[1]
     # A tent as wide as the larger of both pixels: linear when enlarging, an average when reducing.
     radius_y, radius_x = max(1.0, step_y), max(1.0, step_x)
     for y in range(result.shape[0]):
         # Position of this pixel, counted in values.
-        centre_y = (y + place) * step_y - place
+        centre_y = (y + 0.5) * step_y - 0.5
         top, bottom = max(0, math.ceil(centre_y - radius_y)), min(values.shape[0] - 1, int(centre_y + radius_y))
         for x in range(result.shape[1]):
-            centre_x = (x + place) * step_x - place
+            centre_x = (x + 0.5) * step_x - 0.5
             left, right = max(0, math.ceil(centre_x - radius_x)), min(values.shape[1] - 1, int(centre_x + radius_x))
             # The range under the footprint: does it span a depth edge?
             low, high = np.inf, -np.inf

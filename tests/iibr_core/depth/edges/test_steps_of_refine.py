@@ -6,7 +6,6 @@ from benchmarks.scenes import network_like
 from iibr_core.depth.edges.blur import measure_edge_blur
 from iibr_core.depth.edges.fit import fit_to_blur
 from iibr_core.depth.edges.lone import fill_lone
-from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.training.degradation import blur
@@ -99,16 +98,6 @@ def test_a_soft_map_becomes_a_ramp_and_an_exact_one_stays_a_step() -> None:
     ramp = resample_map(np.asarray(cv2.GaussianBlur(step, (0, 0), 1.2)), ImageSize(60, 60))[30]
     assert (np.diff(ramp) >= 0).all()
     assert np.diff(ramp).max() < 1.2
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_maps_made_by_leaving_out_pixels_lie_at_corners_and_others_do_not(seed) -> None:
-    photo, exact = drawn(seed)
-    assert lies_at_corners(photo, cv2.resize(exact, SMALL_SIZE, interpolation=cv2.INTER_NEAREST))
-    for kind in (cv2.INTER_AREA, cv2.INTER_NEAREST_EXACT):
-        assert not lies_at_corners(photo, cv2.resize(exact, SMALL_SIZE, interpolation=kind))
-    for other in (soft(exact), exact, np.full((60, 80), np.nan, np.float32)):
-        assert not lies_at_corners(photo, other)
 
 
 @pytest.mark.parametrize("make", [soft, lambda exact: network_like(exact, 1)])
