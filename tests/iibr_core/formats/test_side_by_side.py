@@ -74,7 +74,7 @@ def test_pairs_are_known_by_their_names_and_show_the_left_eye(tmp_path, name) ->
     Image.fromarray(np.concatenate(parts, axis=axis)).save(path, kind, quality=95, subsampling=0)
     shown = read_photo(path)
     assert shown.size == SIZE
-    assert "Taken for a stereo pair" in shown.notes[0]
+    assert re.match(r"Taken for a stereo pair.*: the left eye's picture is shown", shown.notes[0])
     assert ("side by side" if axis == 1 else "one over the other") in shown.notes[0]
     tolerance = 12 if is_half else 4
     assert np.abs(255 * shown.pixels - LEFT).mean() < tolerance
