@@ -45,8 +45,6 @@ class Stages:
 
 
 ALL_STAGES = Stages()
-CLOSED_FORM = Stages(ray_transformer=False)
-"""The stages that a ray set depends on: the transformer decides pixels of views, but no ray that is inpainted."""
 STAGE_NAMES = tuple(stage.name.replace("_", "-") for stage in fields(Stages))
 """Names of the stages on the command line."""
 

@@ -169,7 +169,7 @@ class _ViewsBetween:
         colors, disparity, hole = view.colors, view.disparity, view.occluded
         if hole.any() and self._inpainted is not None:
             origin, rays = self._inpainted
-            filled, *_ = self._renderer.visible(rays, self._moved(origin, offset))
+            filled, _ = self._renderer.visible(rays, self._moved(origin, offset))
             is_filled = hole & ~filled.occluded
             colors[is_filled], disparity[is_filled] = filled.colors[is_filled], filled.disparity[is_filled]
             hole &= filled.occluded
@@ -187,7 +187,7 @@ class _ViewsBetween:
             away = ViewOffset(offset.t - at.t, offset.s - at.s)
             if max(map(abs, away)) > self._steps:
                 continue
-            view, covered, _ = self._renderer.visible(rays, self._moved(at, offset))
+            view, covered = self._renderer.visible(rays, self._moved(at, offset))
             near = (1 - abs(away.t) / self._steps) * (1 - abs(away.s) / self._steps) + FAR_WEIGHT
             weight = np.where(view.occluded, np.float32(0), np.float32(near) * covered**COVERED_POWER)
             # Encoded, as colours of one surface are interpolated: all views show the same light.

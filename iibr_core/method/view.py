@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,18 +57,14 @@ class Renderer:
         threads: number of row bands side by side; it does not change the result. reopens: whether what other views
         inpainted is inpainted again here where it shows through a hole in one of the photo's surfaces.
         """
-        view, covered, decided = self.visible(rays, offset, threads)
-        # Filled before the transformer's choice is written: the closed form's disparity is smoother, so are the holes.
+        view, covered = self.visible(rays, offset, threads)
         view = self._fill(rays, offset, view, covered, threads, reopens)
-        _write(decided, view)
         if any(rays.margins):
             _mark_outside_frame(view.disparity, *map(float, offset), view.inpainted)
         return view
 
-    def visible(self, rays: RaySet, offset: ViewOffset, threads: int = 1) -> tuple[View, FloatImage, list[Decided]]:
-        """Return the closed form's view at `offset` with open holes, how much of each ray is covered (H, W), and the
-        choices of the transformer.
-        """
+    def visible(self, rays: RaySet, offset: ViewOffset, threads: int = 1) -> tuple[View, FloatImage]:
+        """Return the view at `offset` with open holes, and how much of each ray is covered (H, W)."""
         size = rays.view_size
         view = View(
             np.empty((*size, 3), np.float32),
@@ -78,14 +74,15 @@ class Renderer:
         )
         covered = np.empty(size, np.float32)
 
-        def band(first: int, last: int) -> Decided | None:
-            return self._render_rows(rays, offset, (first, last), view, covered)
+        def band(first: int, last: int) -> None:
+            self._render_rows(rays, offset, (first, last), view, covered)
 
-        return view, covered, [decided for decided in in_bands(band, size, threads) if decided is not None]
+        in_bands(band, size, threads)
+        return view, covered
 
     def _render_rows(
         self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: View, covered: FloatImage
-    ) -> Decided | None:
+    ) -> None:
         """Write rows [first, last) of the view, holes open, and of how much of each ray is covered."""
         around = SEARCH_PX if self.transformer else 0
         # The images are larger than the view: their rows and columns count here.
@@ -105,14 +102,14 @@ class Renderer:
         view.occluded[shown] = share[inner] < MIN_COVERED
         view.inpainted[shown] = view.occluded[shown] | (found.source[inner] >= rays.photo_images)
         if not self.transformer:
-            return None
+            return
         # Rays that are covered in part are composited over their background, not decided.
         asked = wanted & (share >= max(_min_coverage(rays), MIN_COVERED))
         ambiguous = find_ambiguous_rays(rays, candidates, weights, found, asked)
         raise_if_stopped()
         colors, disparity, source = blend(rays, ambiguous, self.transformer(ambiguous))
-        y, x = ambiguous.pixel[:, 0] - rays.margins.top, ambiguous.pixel[:, 1] - left
-        return Decided(y, x, colors, disparity, source >= rays.photo_images)
+        at = ambiguous.pixel[:, 0] - rays.margins.top, ambiguous.pixel[:, 1] - left
+        view.colors[at], view.disparity[at], view.inpainted[at] = colors, disparity, source >= rays.photo_images
 
     def _fill(
         self, rays: RaySet, offset: ViewOffset, view: View, covered: FloatImage, threads: int, reopens: bool
@@ -140,25 +137,6 @@ class Renderer:
         disparity[part] = np.where(share > MOSTLY_COVERED, foreground_disparity, behind.disparity)
         view.inpainted.reshape(-1)[part] |= share <= MOSTLY_COVERED
         return replace(view, behind=behind)
-
-
-class Decided(NamedTuple):
-    """The transformer's choice for pixels y, x (N,). colors (N, 3), disparity (N,), inpainted (N,): see `View`."""
-
-    y: NDArray[np.int64]
-    x: NDArray[np.int64]
-    colors: FloatImage
-    disparity: FloatImage
-    inpainted: NDArray[np.bool_]
-
-
-def _write(decided: list[Decided], view: View) -> None:
-    """Write the transformer's choices where nothing was filled here: reopened holes were open only after it chose."""
-    for part in decided:
-        chosen = ~view.occluded[part.y, part.x]
-        at = part.y[chosen], part.x[chosen]
-        view.colors[at], view.disparity[at] = part.colors[chosen], part.disparity[chosen]
-        view.inpainted[at] = part.inpainted[chosen]
 
 
 def _reopened(rays: RaySet, offset: ViewOffset, view: View, hole: NDArray[np.bool_], threads: int) -> NDArray[np.bool_]:

@@ -24,7 +24,6 @@ from iibr_core.runtime.tiling import THREADS
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import LoadedPhoto, Scene, Source
-from iibr_core.stages import CLOSED_FORM
 from iibr_core.types import Disparity, FloatImage, InputError, Photo, ViewOffset
 
 
@@ -58,7 +57,7 @@ def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RayS
     if not plan.has_disocclusion:
         return None
     disparity = plan.field_disparity(loaded.disparity)
-    return view_maker(loaded.photo, disparity, plan, source.inpaint, stages=CLOSED_FORM).rays
+    return view_maker(loaded.photo, disparity, plan, source.inpaint).rays
 
 
 def hidden_of_photo(loaded: LoadedPhoto, plan: ScenePlan, scene: Scene, fills: RaySet | None) -> HiddenSurface:

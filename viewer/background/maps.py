@@ -12,7 +12,6 @@ from iibr_core.depth.editing.edits import Stroke, extent_of
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
-from iibr_core.stages import CLOSED_FORM
 from viewer.background.newest import Post
 from viewer.model.inspection import ViewIndex
 
@@ -61,7 +60,7 @@ class EntropyWork:
         if request.view != plan.grid.centre:
             if self._generation != request.generation:
                 disparity = plan.field_disparity(loaded.disparity)
-                self._rays = view_maker(loaded.photo, disparity, plan, request.inpaint, stages=CLOSED_FORM).rays
+                self._rays = view_maker(loaded.photo, disparity, plan, request.inpaint).rays
                 self._generation = request.generation
             values = view_entropy(self._rays, plan.grid.offset(*request.view))
         post(Entropy(request.generation, request.view, np.rint(values * 255).astype(np.uint8)))

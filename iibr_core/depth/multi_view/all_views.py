@@ -92,7 +92,7 @@ def carry(
 
     def carry_to(other: tuple[ViewUpdate, ViewOffset]) -> ViewUpdate:
         update, offset = other
-        view, *_ = Renderer().visible(rays, offset)
+        view, _ = Renderer().visible(rays, offset)
         known = np.where(view.occluded, np.float32(np.nan), view.disparity)
         is_known = not np.isnan(known).all()
         filled = fill_disparity_by_color(encoded_from_stored(update.colors), known) if is_known else values
@@ -116,7 +116,7 @@ def _warp(
     nearest = sorted(maps, key=lambda other: hypot(*away(other)))[:4]
     for other in nearest:
         rays = rays_of_photo(encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0)
-        view, *_ = Renderer().visible(rays, away(other))
+        view, _ = Renderer().visible(rays, away(other))
         np.copyto(warped, view.disparity, where=np.isnan(warped) & ~view.occluded)
     if np.isnan(warped).all():
         return maps[nearest[0]]

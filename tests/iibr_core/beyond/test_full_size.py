@@ -7,7 +7,6 @@ from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.method.light_field import view_maker
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer, finish
-from iibr_core.stages import CLOSED_FORM
 from iibr_core.types import ImageSize, Photo, ViewOffset
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
@@ -46,7 +45,7 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     photo, disparity = square_before_wall(48, 60, foreground=1.5)
     red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
     plan = literal_plan(photo, disparity, 3)
-    maker = view_maker(photo, disparity, plan, stages=CLOSED_FORM)
+    maker = view_maker(photo, disparity, plan)
     rays, renderer = maker.rays, Renderer()
     # Every inpainted ray is made red: so the larger photo's holes are.
     rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
