@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.color import stored_from_encoded
-from iibr_core.exports.full_picture import FullPicture, encode_light
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import MAX_PIXELS, LensTile, RenderSettings
 from iibr_core.exports.source import Draw
 from iibr_core.formats.images.resized_light import mean_of_areas
@@ -47,9 +47,12 @@ def draw_full(
     return _draw_tiles(picture, _read_photo(picture, photo, keep), draw)
 
 
-def draw_picture(scene: Scene, loaded: LoadedPhoto, settings: RenderSettings, draw: Draw) -> NDArray[Any]:
-    """Return the picture of these settings, (height, width, 3), drawn from the photo. draw: draws a tile."""
-    assert scene.plan is not None, "a light field from disk has no photo"
+def draw_picture(scene: Scene, loaded: LoadedPhoto | None, settings: RenderSettings, draw: Draw) -> NDArray[Any]:
+    """Return the picture of these settings, (height, width, 3), drawn from the photo where that shows more, see
+    `is_full`. draw: draws the picture from the views, or a tile.
+    """
+    if scene.plan is None or loaded is None or not is_full(scene, settings.optics, settings.size_px):
+        return draw(settings)
     light = draw_full(FullPicture(scene, scene.plan, loaded, settings.optics, settings.size_px), draw)
     return encode_light(light, settings.is_linear, settings.color_space, scene.color_space)
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.full_picture import is_full
@@ -38,7 +35,6 @@ from viewer.model.viewpoint import clicked_rack
 
 OPEN_PHOTO = "This is the open photo. Choose another name."
 NO_MAP = "a light field has no depth map to save"
-PictureNeeds = Callable[[Scene, Optics], Needs]
 
 
 def add_file(task: SaveTask | ExportTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
@@ -71,7 +67,7 @@ def add_copy(state: AppState, jobs: Jobs) -> list[Action]:
         return [do(messages.notify, Notice("There is no picture to copy yet. Open a photo first."))]
     path, shot = copied_path(), shot_of(state, state.scene.size, AS_USUAL)
     needs = partial(_needs, state.scene.size, True)
-    jobs.add(Job("copy", path, state, partial(_copy, path, shot, needs), needs), state.scene)
+    jobs.add(Job("copy", path, state, partial(_copy, path, shot), needs), state.scene)
     return []
 
 
@@ -82,9 +78,9 @@ def _save_job(prompt: SavePrompt, may_replace: bool, state: AppState, scene: Sce
             raise InputError(f"{path}: {NO_MAP}")
         work = partial(_save_map, path, prompt)
         return Job("map", path, state, work, lambda scene, optics: "photo", prompt=prompt)
-    needs = partial(_needs, prompt.size_px, state.free_camera is not None)
-    shot = shot_of(state, prompt.size_px, prompt.form)
-    return Job("picture", path, state, partial(_save, path, shot, needs, prompt), needs, prompt=prompt)
+    is_as_shown, shot = state.free_camera is not None, shot_of(state, prompt.size_px, prompt.form)
+    work, needs = partial(_save, path, shot, is_as_shown, prompt), partial(_needs, prompt.size_px, is_as_shown)
+    return Job("picture", path, state, work, needs, prompt=prompt)
 
 
 def checked_path(prompt: SavePrompt, may_replace: bool, inputs: Sequence[Path]) -> Path:
@@ -133,13 +129,13 @@ def _needs(size: ScreenSize, is_as_shown: bool, scene: Scene, optics: Optics) ->
 # In the threads of the jobs
 
 
-def _save(path: Path, shot: SavedShot, needs: PictureNeeds, prompt: SavePrompt, source: ExportSource) -> list[Action]:
-    return [do(saving.finish_job, _write(path, shot, needs, source), "", prompt)]
+def _save(path: Path, shot: SavedShot, is_as_shown: bool, prompt: SavePrompt, source: ExportSource) -> list[Action]:
+    return [do(saving.finish_job, _write(path, shot, is_as_shown, source), "", prompt)]
 
 
-def _copy(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> list[Action]:
+def _copy(path: Path, shot: SavedShot, source: ExportSource) -> list[Action]:
     make_folder(path.parent)
-    copy_picture(_write(path, shot, needs, source))
+    copy_picture(_write(path, shot, True, source))
     return [do(messages.notify, Notice("Copied the picture.", is_result=True))]
 
 
@@ -158,23 +154,19 @@ def _export(kind: ExportKind, path: Path, prompt: ExportPrompt, source: ExportSo
     return [do(saving.finish_job, path, message or "", prompt)]
 
 
-def _write(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> Path:
-    """Draw a picture and write it. Raises InputError with the file's name."""
+def _write(path: Path, shot: SavedShot, is_as_shown: bool, source: ExportSource) -> Path:
+    """Draw a picture, of the views that the window shows or as its size asks for, and write it. Raises InputError with
+    the file's name.
+    """
+    from iibr_core.exports.full_drawing import draw_picture
+
     shot = replace(shot, settings=replace(shot.settings, optics=source.optics))
+    is_linear, size = is_float(path, shot.form), shot.settings.size_px
+    settings = RenderSettings(source.optics, size, is_linear=is_linear, color_space=shot.color_space)
+    loaded = None if is_as_shown else source.loaded
     try:
-        pixels = _draw(shot, is_float(path, shot.form), needs, source)
+        pixels = draw_picture(source.scene, loaded, settings, source.draw)
     except (InputError, MemoryError) as error:
         raise InputError(f"{path}: not saved. {message_of(error)}") from error
     report_progress(1, 1, WRITING)
     return export_picture(path, pixels, shot)
-
-
-def _draw(shot: SavedShot, is_linear: bool, needs: PictureNeeds, source: ExportSource) -> NDArray[Any]:
-    """Return the picture, (H, W, 3), bytes or linear light, drawn from the photo at its own size if it needs that."""
-    from iibr_core.exports.full_drawing import draw_picture
-
-    scene, loaded, size = source.scene, source.loaded, shot.settings.size_px
-    settings = RenderSettings(source.optics, size, is_linear=is_linear, color_space=shot.color_space)
-    if needs(scene, source.optics) != "photo" or scene.plan is None or loaded is None:
-        return source.draw(settings)
-    return draw_picture(scene, loaded, settings, source.draw)

@@ -167,18 +167,15 @@ class OffscreenScene(ExitStack):
         It is uint8, encoded by sRGB's curve, or float32 linear light with 1 = white. Raises InputError for sizes out of
         range, and if the photo cannot be read again at its own size.
         """
-        frame, optics, loaded = ScreenSize(*(size or self.scene.size)), self.state.optics, self.view.loaded
+        from iibr_core.exports.full_drawing import draw_picture  # heavy, and not for every scene
+
+        frame = ScreenSize(*(size or self.scene.size))
         if self.state.stereo.display is not None:
             return self._woven_picture(frame)
         box_size = size_in_frame(self.scene, frame)
         require_size(box_size)
-        settings = RenderSettings(optics, box_size, is_linear=is_linear, color_space=color_space)
-        if is_full(self.scene, optics, box_size) and self.scene.plan is not None and loaded is not None:
-            from iibr_core.exports.full_drawing import draw_picture
-
-            pixels = draw_picture(self.scene, loaded, settings, self.view.renderer.converged_picture)
-        else:
-            pixels = self.draw(settings)
+        settings = RenderSettings(self.state.optics, box_size, is_linear=is_linear, color_space=color_space)
+        pixels = draw_picture(self.scene, self.view.loaded, settings, self.draw)
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
 

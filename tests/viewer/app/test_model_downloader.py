@@ -14,7 +14,7 @@ from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import local_hub
-from viewer.background.depth_models import OFFLINE
+from viewer.background.depth_models import OFFLINE, list_models
 from viewer.model import depth, depth_models, history, lens, opening, preferences, window
 from viewer.model.action import do
 from viewer.model.depth import Brush
@@ -231,6 +231,8 @@ def test_a_copied_model_is_listed_and_used_for_photos_without_depth(hub, open_wi
     assert driver.app.state.scene.depth_model == "mine"
     driver.do(do(depth_models.show_models))
     assert any(model.name == "mine" and model.is_ready for model in driver.app.state.models.known)
+    monkeypatch.setattr("iibr_core.depth.models.known.is_installed", lambda name: False)
+    assert all(offer.lacks.startswith("needs the package ") for offer in list_models())
 
 
 @pytest.mark.parametrize("is_lost", [False, True])

@@ -9,13 +9,13 @@ import pytest
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
-from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
+from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
-from viewer.app.picture_files import export_picture, inputs_of_scene, read_settings, shot_of
+from viewer.app.picture_files import export_picture, inputs_of_scene, shot_of
 from viewer.app.saving import checked_path
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
@@ -57,14 +57,6 @@ def test_exr_holds_light_finer_than_png(opened, tmp_path):
     encoded = srgb_from_linear(light) * 255
     assert np.abs(encoded - png).max() <= 0.51, "the same picture"
     assert np.mean(np.abs(encoded - np.rint(encoded)) > 0.05) > 0.5, "not rounded to 8 bits on the way"
-
-
-@pytest.mark.parametrize("name", [f"a{ending}" for ending in KINDS])
-def test_settings_are_inside(opened, tmp_path, name):
-    saved(opened, tmp_path / name, (70, 50))
-    settings = read_settings(tmp_path / name)
-    assert settings.optics == opened.state.optics
-    assert settings.size_px == (70, 50)
 
 
 @pytest.mark.parametrize("what", ["picture", "map"])

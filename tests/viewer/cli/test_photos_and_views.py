@@ -66,6 +66,8 @@ def test_a_photo_without_depth_gets_a_guess_or_a_models(iibr, folder, options, i
     disparity = np.load("map.npy")
     assert disparity.shape == (60, 80)
     assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
+    inverse = iibr_core.estimate_depth("photo.png", "red.onnx")
+    assert np.median(inverse[-12:]) > np.median(inverse[:12]), "in Python, too"
 
 
 def test_python_and_commands_give_the_same_numbers(iibr, photo_path, folder):

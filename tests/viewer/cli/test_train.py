@@ -7,6 +7,7 @@ import pytest
 
 from iibr_core.formats.weights import read_weights
 from iibr_core.training import batches
+from iibr_core.types import InputError
 from tests.viewer.cli.conftest import output_of, refusal_of
 
 WORDS = ("train", "--device", "cpu", "--seed", 3, "-o", "w.safetensors")
@@ -29,6 +30,8 @@ def test_steps_write_weights_with_their_command(iibr):
     assert names() == WRITTEN
     assert read_weights(Path("w.safetensors"))[1]["command"] == f"iibr {' '.join(map(str, WORDS))} --steps 3"
     assert len(Path("w.csv").read_text().splitlines()) == 4
+    with pytest.raises(InputError, match=r"gone\.safetensors: no such file"):
+        read_weights(Path("gone.safetensors"))
 
 
 def test_ctrl_c_saves_and_names_the_command_that_continues(iibr, monkeypatch):
