@@ -9,7 +9,7 @@ from iibr_core.scenes.scene import Source
 from tests.viewer.model.test_opening import scene_of
 from viewer.model import folder, inspection, opening
 from viewer.model.app_state import AppState
-from viewer.model.folder import filmstrip_range
+from viewer.model.folder import AHEAD, filmstrip_range, photos_ahead
 
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 
@@ -34,6 +34,9 @@ def test_numbers_in_names_are_counted_and_times_go_first_where_that_is_wanted():
 def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends():
     state = folder.step(state_at("img_9.jpg"), 1)
     assert (open_name(state), state.generation) == ("IMG_10.jpg", 1)
+    assert [source.path[8:] for source in photos_ahead(state, AHEAD)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
+    back = folder.step(state, -1)
+    assert [source.path[8:] for source in photos_ahead(folder.step(folder.step(back, 3), -1), (1,))] == ["IMG_10.jpg"]
     assert state.source.max_pixels == 7
     state = folder.step(folder.step(state, 1), 1)
     assert open_name(state) == "Ä.png"

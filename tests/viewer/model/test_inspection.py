@@ -12,7 +12,7 @@ from tests.viewer.conftest import reduce
 from viewer.model import inspection, opening, window
 from viewer.model.app_state import AppState
 from viewer.model.commands import BY_NAME
-from viewer.model.inspection import Hover, Inspection, Probe, sheet_cells, view_at, view_near
+from viewer.model.inspection import Hover, Inspection, Probe, beside_of, sheet_cells, view_at, view_near
 from viewer.model.layout import Beside, layout_of
 from viewer.model.preferences import Preferences
 from viewer.ui.overlays.inspection_overlay import legend_words, status_text
@@ -92,6 +92,9 @@ def test_the_view_near_the_eye(eye, view):
 
 def test_strips_take_their_room_beside_the_picture_and_line_up_with_it():
     plain = layout_of((900, 700), (60, 40))
+    single = replace(OPEN, scene=replace(SCENE, grid=GridShape(1, 1)))
+    views = [beside_of(inspection.show_epis(state, True)).epi_views for state in (single, OPEN)]
+    assert views == [None, (5, 7)], "a single view has no EPIs"
     layout = layout_of((900, 700), (60, 40), 2.0, 1.0, Beside((5, 9), has_status=True))
     picture, across, down, status = layout.picture, layout.strip_across, layout.strip_down, layout.status
     assert plain.strip_across is plain.strip_down is plain.status is None

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import ApertureMask, ApertureShape
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.exports.kinds import ExportOptions
@@ -21,7 +22,6 @@ from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_p
 from tests.viewer.conftest import headless_with_scene
 from viewer.model import depth, inspection, lens, messages, preferences, selection, stereo, tracking, viewpoint
 from viewer.model.action import do
-from viewer.model.app_state import AppState
 from viewer.model.browsing import Listing, PathPrompt
 from viewer.model.commands import PalettePrompt
 from viewer.model.depth import Brush, DepthSample
@@ -64,15 +64,19 @@ def export(kind, **options):
     return prompt(ExportPrompt(kind, "/photos/a", ExportOptions(**options)))
 
 
+MASKED = ApertureShape("mask", mask=ApertureMask("star.png", 2, 2, b"\xff\x80\x00\xff"))
 GLOSSY = replace(FIRST_GLOSS, surface=GlossSurface(farthest=0.2, color=(0.6, 0.1, 0.1)))
 SCREENS = {
-    "panel": (TALL, (HOVER, do(lens.set_dolly, -0.5)), {"monitors": (MONITOR,), "facts": PhotoFacts("", ())}),
+    "panel": (
+        TALL, (HOVER, do(lens.set_dolly, -0.5), do(lens.set_aperture_shape, MASKED)),
+        {"monitors": (MONITOR,), "facts": PhotoFacts("", ())},
+    ),
     "panel in light": (
         TALL,
         (
             LIGHT, IN_PIXELS, do(lens.set_gloss, GLOSSY),
             do(lens.take_gloss_brush, GlossBrush(erases=True, is_on=True)),
-            do(lens.set_aperture_shape, replace(AppState().optics.aperture_shape, kind="cat_eye")),
+            do(lens.set_aperture_shape, ApertureShape("cat_eye")),
             do(viewpoint.set_loop, "circle"), do(inspection.compare, "photo"), do(inspection.take_snapshot),
             do(lens.show_tilt_handles, True), do(tracking.switch, "udp:4242"), HOVER, do(stereo.set_eyes, 2.0),
             do(stereo.swap_eyes), do(lens.set_focus_range, 0.3), do(depth.set_tone, DepthEdits(True, 0.2, 0.7), True),
@@ -87,7 +91,7 @@ SCREENS = {
         (
             HOVER, do(depth.set_brush, Brush("fill", is_on=True, sample=DepthSample((0.3, 0.6), 1.0))),
             do(selection.select, (0.5, 0.5)), do(selection.set_range, (0.0, 1.0)),
-            do(lens.set_aperture_shape, replace(AppState().optics.aperture_shape, kind="polygon", rotation_deg=20.0)),
+            do(lens.set_aperture_shape, ApertureShape("polygon", rotation_deg=20.0)),
         ),
         {},
     ),
@@ -97,7 +101,7 @@ SCREENS = {
             do(inspection.show_epis, True), do(inspection.show_values, True), do(inspection.set_overlay, "disparity"),
             do(viewpoint.set_zoom, Zoom(6.0, (0.6, 0.4))), HOVER, do(lens.show_tilt_handles, True),
         ),
-        {},
+        {"origin": GUESSED},
     ),
     "compared": (
         WIDE,
