@@ -26,12 +26,15 @@ def test_round_trip_with_metadata_and_the_file_may_be_replaced_while_its_weights
     assert all(np.array_equal(arrays[name], before[name]) for name in arrays)
 
 
-def test_truncated_files_are_refused(path):
+def test_truncated_and_missing_files_are_refused(path):
     data = path.read_bytes()
     for length in range(1, len(data), 7):
         path.write_bytes(data[:length])
         with pytest.raises(InputError, match=rf"^{path}: is not a safetensors file, or is damaged .*$"):
             read_weights(path)
+    path.unlink()
+    with pytest.raises(InputError, match="no such file"):
+        read_weights(path)
 
 
 @pytest.mark.parametrize(
