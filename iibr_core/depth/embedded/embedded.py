@@ -103,41 +103,31 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
         xmp = xmp_of(layout)
     except InputError as error:
         damage = error
-    readers: dict[str, Callable[[], DepthEstimate | None]] = {
-        DYNAMIC_DEPTH: lambda: dynamic_depth_estimate(xmp, data, layout.end),
-        GDEPTH: lambda: gdepth_estimate(xmp),
-        "Apple portrait": lambda: appended_estimate(data, layout.end),
-        SAMSUNG: lambda: samsung_estimate(data),
-        "Leia": lambda: leia_estimate(data),
-        HUAWEI: lambda: huawei_estimate(data, layout.end),
-        SECOND_PICTURE: lambda: second_picture_estimate(data, layout.end),
+    end = layout.end
+    formats: dict[str, tuple[Callable[[], DepthEstimate | None], Callable[[], bytes | None]]] = {
+        DYNAMIC_DEPTH: (lambda: dynamic_depth_estimate(xmp, data, end), lambda: dynamic_original(xmp, data, end)),
+        GDEPTH: (lambda: gdepth_estimate(xmp), lambda: all_in_focus(xmp) or second_in_focus(data, end)),
+        "Apple portrait": (lambda: appended_estimate(data, end), lambda: None),
+        SAMSUNG: (lambda: samsung_estimate(data), lambda: samsung_in_focus(data)),
+        "Leia": (lambda: leia_estimate(data), lambda: None),
+        HUAWEI: (lambda: huawei_estimate(data, end), lambda: second_in_focus(data, end)),
+        SECOND_PICTURE: (lambda: second_picture_estimate(data, end), lambda: second_in_focus(data, end)),
     }
-    for name, read in readers.items():
+    for name, (read_map, read_in_focus) in formats.items():
         try:
-            estimate = read()
+            estimate = read_map()
         except InputError as error:
             damage = damage or error
             continue
         if estimate is not None:
             notes = range_notes(xmp) if name in (GDEPTH, DYNAMIC_DEPTH) else ()
-            return EmbeddedDepth(estimate, name, _in_focus(name, xmp, data, layout.end), notes)
+            try:
+                return EmbeddedDepth(estimate, name, read_in_focus(), notes)
+            except InputError:  # b"" stands for a damaged picture
+                return EmbeddedDepth(estimate, name, b"", notes)
     if damage is not None:
         raise damage
     return None
-
-
-def _in_focus(name: str, xmp: Element, data: bytes, end: int) -> bytes | None:
-    """Return the file of the picture before the camera blurred it, b"" if it is damaged, None without."""
-    finders: dict[str, Callable[[], bytes | None]] = {
-        DYNAMIC_DEPTH: lambda: dynamic_original(xmp, data, end),
-        GDEPTH: lambda: all_in_focus(xmp),
-        SAMSUNG: lambda: samsung_in_focus(data),
-    }
-    try:
-        found = finders.get(name, lambda: None)()
-    except InputError:
-        return b""
-    return second_in_focus(data, end) if found is None and name in (HUAWEI, SECOND_PICTURE, GDEPTH) else found
 
 
 def leia_estimate(data: bytes) -> DepthEstimate | None:

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE
-from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
@@ -16,14 +15,12 @@ from iibr_core.scenes.light_fields import FROM_VIEWS, open_settled
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, ViewOffset
+from tests.iibr_core.depth.multi_view.test_order import HEIGHT, SQUARE_PX, WALL_PX, WIDTH, view_at
 from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
-from tests.iibr_core.scenes import bilinear
 from tests.viewer.conftest import reduce
 from viewer.model import lens, opening
 from viewer.model.action import do
 from viewer.model.app_state import AppState
-
-WALL_PX, SQUARE_PX = -0.5, 1.25
 
 
 def test_a_light_field_without_disparity_finds_its_own(tmp_path) -> None:
@@ -36,7 +33,7 @@ def test_a_light_field_without_disparity_finds_its_own(tmp_path) -> None:
     assert final[0].scene.depth_source == FROM_VIEWS
     assert final[0].scene.disparity_range_px == pytest.approx((WALL_PX, SQUARE_PX), abs=0.15)
     for view in (result.view for result in final[1]):
-        assert view.disparity[48, 48] == pytest.approx(SQUARE_PX, abs=0.1)
+        assert view.disparity[36, 48] == pytest.approx(SQUARE_PX, abs=0.1)
         assert view.disparity[8, 8] == pytest.approx(WALL_PX, abs=0.1)
 
 
@@ -54,7 +51,7 @@ def test_found_disparity_is_kept_for_the_next_time_until_a_view_changes(tmp_path
     assert again.scene == first.scene
     assert np.array_equal(again.centre.disparity, first.centre.disparity)
     assert [(view.view.row, view.view.column) for view in views] == [(2, 2), (2, 3)]
-    assert views[-1].view.disparity[48, 47] == pytest.approx(SQUARE_PX, abs=0.1)
+    assert views[-1].view.disparity[36, 47] == pytest.approx(SQUARE_PX, abs=0.1)
     (folder / "v0_u0.png").touch()
     with pytest.raises(TypeError):
         list(results_of(request, lambda: CENTRE))
@@ -64,11 +61,12 @@ def test_found_disparity_is_kept_for_the_next_time_until_a_view_changes(tmp_path
 def test_a_field_that_does_not_fit_is_thinned(tmp_path, monkeypatch, is_asked) -> None:
     folder, grid = write_two_planes(tmp_path / "field"), GridShape(3, 3)
     if not is_asked:
-        monkeypatch.setattr("iibr_core.scenes.light_fields.MAX_PIXELS", 10 * 96 * 96)
+        monkeypatch.setattr("iibr_core.scenes.light_fields.MAX_PIXELS", 10 * HEIGHT * WIDTH)
     source = Source(str(folder), arrangement=Arrangement(grid=grid) if is_asked else UNKNOWN)
     ((ready, views),) = showings(results_of(SceneRequest(1, source, takes_drafts=False), lambda: CENTRE))
     assert (ready.scene.grid, len(views)) == (grid, 9)
-    assert ready.scene.disparity_range_px == pytest.approx((2 * WALL_PX, 2 * SQUARE_PX), abs=0.3)
+    found = views[0].view.disparity
+    assert (found[8, 8], found[36, 48]) == pytest.approx((2 * WALL_PX, 2 * SQUARE_PX), abs=0.15)
     assert "One of every 2 rows and columns of views is used: 3x3 of 5x5." in ready.scene.notes
     field, notes = open_settled(source)
     assert (field.grid, field.layout) == (grid, "grid folder, 3x3 of 5x5")
@@ -77,7 +75,7 @@ def test_a_field_that_does_not_fit_is_thinned(tmp_path, monkeypatch, is_asked) -
 
 def test_the_centre_views_disparity_may_be_given(tmp_path) -> None:
     folder, given = write_two_planes(tmp_path / "field"), tmp_path / "given.npy"
-    np.save(given, np.full((96, 96), 0.25, np.float32))
+    np.save(given, np.full((HEIGHT, WIDTH), 0.25, np.float32))
     request = SceneRequest(1, Source(str(folder), DepthChoice(file=str(given), file_scale=2.0)), takes_drafts=False)
     ((ready, views),) = showings(results_of(request, lambda: CENTRE))
     assert (ready.scene.depth_source, ready.scene.disparity_range_px) == ("given.npy", (0.5, 0.5))
@@ -140,15 +138,9 @@ def showings(results: Iterator[SceneReady | ViewReady]) -> Iterator[tuple[SceneR
 def write_two_planes(folder: Path) -> Path:
     """5x5 views of a textured square before a textured wall, as numbered pictures."""
     (folder / "views").mkdir(parents=True)
-    rough = np.random.default_rng(1).random((2, 201, 201)).astype(np.float32)
-    texture = (rough[:, 1:, 1:] + rough[:, :-1, 1:] + rough[:, 1:, :-1] + rough[:, :-1, :-1]) / 4
-    y, x = np.mgrid[:96, :96].astype(np.float32)
     for row, column in np.ndindex(5, 5):
-        t, s = row - 2, column - 2
-        inside = (abs(y + SQUARE_PX * t - 48) < 24) & (abs(x + SQUARE_PX * s - 48) < 24)
-        parts = [bilinear(texture[k], y + d * t + 20, x + d * s + 20) for k, d in enumerate((WALL_PX, SQUARE_PX))]
-        pixels = bytes_from_encoded(np.where(inside, parts[1], parts[0]))
-        write_image_file(folder / "views" / f"v{row}_u{column}.png", np.repeat(pixels[..., None], 3, -1), "uint8")
+        pixels = np.repeat(view_at(row - 2.0, column - 2.0)[..., None], 3, -1)
+        write_image_file(folder / "views" / f"v{row}_u{column}.png", pixels, "uint8")
     return folder
 
 

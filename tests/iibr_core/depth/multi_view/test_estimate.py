@@ -36,7 +36,7 @@ def slanted_views(slope, offsets=OFFSETS, size=(80, 96)):
 
 
 @pytest.mark.parametrize(
-    ("slope", "offsets", "limit"), [(0.0, OFFSETS, 0.07), (-0.03, OFFSETS, 0.07), (0.05, PAIR, 0.2)]
+    ("slope", "offsets", "limit"), [(0.0, OFFSETS, 0.005), (-0.03, OFFSETS, 0.015), (0.05, PAIR, 0.05)]
 )
 def test_a_slanted_plane_comes_back_to_fractions_of_a_pixel(slope, offsets, limit):
     views, truth = slanted_views(slope, offsets)
