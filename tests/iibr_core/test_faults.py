@@ -56,6 +56,9 @@ def test_a_cache_that_cannot_be_written_or_is_full_costs_nothing_but_time(tmp_pa
     estimate_cache.store("key", estimate)
     kept = estimate_cache.load("key")
     assert np.array_equal(kept.values, estimate.values)
+    monkeypatch.setattr(estimate_cache, "MAX_BYTES", NOISE[..., 0].size * 6)
+    estimate_cache.store("newer", estimate)
+    assert [path.stem for path in (tmp_path / "depth").glob("*.npz")] == ["newer"], "the older one goes"
 
 
 def test_a_damaged_cache_is_an_empty_one(tmp_path, monkeypatch):

@@ -56,7 +56,7 @@ class Settled:
     views: all views, the centre and those near it first. offsets: their viewpoints from it. coarse: its disparity.
     arrangement: the order, UNKNOWN where the layout is sure of it. measured: number of views that show the order, 0 if
     they do not. verdict: of its test by parallax. is_sure: whether near and far cannot be exchanged. named: the field
-    in the order of its names.
+    in the order of its names. is_left: see `settle`.
     """
 
     field: MultiView
@@ -68,6 +68,7 @@ class Settled:
     is_sure: bool
     named: MultiView
     verdict: Verdict = "clear"
+    is_left: bool = False
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -98,7 +99,8 @@ def settle(
     if fit is None:
         order = UNKNOWN if given == UNKNOWN else as_given(field, given)
         return replace(_placed(field, ordered, order, 0, is_sure=True, is_left=is_left), verdict=verdict)
-    settled = _placed(field, ordered, fit.arrangement, len(fit.places), is_sure=given.flip is not None)
+    is_sure = given.flip is not None
+    settled = _placed(field, ordered, fit.arrangement, len(fit.places), is_sure, is_left)
     return settled if settled.is_sure else _faced(settled, settled.coarse.values, CLEAR_RATIO)
 
 
@@ -116,7 +118,7 @@ def _placed(
     arrangement: Arrangement,
     measured: int,
     is_sure: bool,
-    is_left: bool = False,
+    is_left: bool,
 ) -> Settled:
     """Return a field in this order. views: in the order of the field's own."""
     field = named if arrangement == UNKNOWN else arranged(named, arrangement)
@@ -131,7 +133,7 @@ def _placed(
     coarse = estimate_coarse([view.colors for view in views], offsets, centre)
     near_first = sorted(range(len(moved)), key=lambda k: (k != centre, math.hypot(*offsets[k])))
     views, offsets = [moved[k] for k in near_first], [offsets[k] for k in near_first]
-    return Settled(field, views, offsets, coarse, arrangement, measured, is_sure, named)
+    return Settled(field, views, offsets, coarse, arrangement, measured, is_sure, named, is_left=is_left)
 
 
 def _faced(settled: Settled, values: FloatImage, clear_ratio: float) -> Settled:
@@ -146,7 +148,7 @@ def _faced(settled: Settled, values: FloatImage, clear_ratio: float) -> Settled:
     if ratio >= 1 / clear_ratio:
         return replace(settled, is_sure=ratio > clear_ratio)
     ordered = in_order_of(settled.field, settled.views)
-    return _placed(settled.named, ordered, _turned(settled), settled.measured, is_sure=True)
+    return _placed(settled.named, ordered, _turned(settled), settled.measured, True, settled.is_left)
 
 
 def _turned(settled: Settled) -> Arrangement:

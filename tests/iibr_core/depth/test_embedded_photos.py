@@ -28,6 +28,7 @@ def opened(tmp_path: Path, name: str, data: bytes) -> PhotoWithDepth:
 def assert_disc_is_nearest(found: PhotoWithDepth) -> None:
     assert found.origin.kind == "embedded"
     assert found.disparity.values[60, 60] > found.disparity.values[90, 10] > found.disparity.values[4, 10]
+    assert found.disparity.values[60, 33] > found.disparity.values[60, 94], "not mirrored"
 
 
 # ---- Google

@@ -65,7 +65,8 @@ def test_integers_are_relative_and_the_photo_tells_which_end_is_near(tmp_path, n
     assert_true_to_scene(found)
     assert np.ptp(found.disparity.values) < 0.02 * WIDTH
     assert found.origin.near == ("black" if black_is_near else "white")
-    assert any(f"{found.origin.near} counts as near" in note for note in found.disparity.notes)
+    (note,) = (note for note in found.disparity.notes if f"{found.origin.near} counts as near" in note)
+    assert remedy_of(note) is Remedy.INVERT
     if black_is_near and name == "map.png":
         assert_true_to_scene(opened(tmp_path, name, file_scale=-1.0))
     turned = opened(tmp_path, name, inverts=True)

@@ -33,6 +33,8 @@ def test_a_known_model_is_here_once_all_of_its_files_are(tmp_path, name) -> None
     found = catalog.model_to_use(DepthChoice("model", model=name))
     assert (found.title, found.folder, found.weights) == (model.title, folder, (folder / model.files[-1],))
     assert found.is_meaning_known
+    assert model.is_recommended == (name == USUAL_MODEL)
+    assert catalog.model_at_hand() == (found if name == USUAL_MODEL else None), "only what runs as installed"
 
 
 def test_a_folder_with_several_files_asks_which(tmp_path) -> None:

@@ -244,6 +244,12 @@ def test_hidden_places_show_which_side_is_near(sign: int) -> None:
     assert nearness_ratio(lumas, offsets, np.zeros_like(truth)) == 1
 
 
+def test_the_disparity_of_a_pair_is_that_of_its_left_view(tmp_path: Path) -> None:
+    pair = write_views(tmp_path / "pair", {"v0_u0": (0.0, 0.0), "v0_u1": (0.0, 4.0)})
+    values = find_disparity(Source(str(pair)))[1]
+    assert (values[36, 62], values[36, 80]) == pytest.approx((4 * SQUARE_PX, 4 * WALL_PX), abs=0.3)
+
+
 def test_views_that_disagree_about_the_near_side_leave_it_open() -> None:
     rng = np.random.default_rng(4)
     lumas = [np.float32(rng.random((60, 80))) for _ in range(5)]
