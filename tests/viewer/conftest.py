@@ -255,6 +255,10 @@ class Driver:
         """Close the window, as leaving the program does."""
         self.app.close()
 
+    def texts(self):
+        """The words of all notices."""
+        return [notice.text for notice in self.app.state.notices]
+
     def image(self):
         """The picture as it was drawn last."""
         return self.app.scene_view.renderer.read_image()

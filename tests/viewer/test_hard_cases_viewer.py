@@ -10,13 +10,11 @@ import sys
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.formats.images.open_picture import settings_text_in
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import GridShape, InputError, ViewUpdate
+from iibr_core.scenes.scene import SceneRequest, Source, ViewReady
+from iibr_core.types import GridShape, InputError
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.picture_files import read_settings
@@ -30,15 +28,6 @@ def desk():
     made = Desk()
     yield made
     made.thread.close()
-
-
-def failure(desk, request):
-    """What the worker says of a job that must fail; then it carries out another."""
-    desk.thread.submit(request)
-    while not isinstance(result := desk.next(), Failed):
-        assert not isinstance(result, SceneReady | ViewReady)
-    assert "\n" not in result.message
-    return result.message
 
 
 def goes_on(desk, folder, generation):
@@ -65,21 +54,6 @@ def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(desk, tmp_path,
     assert "MemoryError" in result.message
     assert "\n" not in result.message
     goes_on(desk, tmp_path, 2)
-
-
-def test_a_view_deleted_while_the_light_field_opens(desk, tmp_path):
-    """The views that were read stay; the one that is gone is named."""
-    views = (ViewUpdate(*at, np.full((8, 9, 3), 90, np.uint8), None) for at in np.ndindex(3, 3))
-    write_light_field(tmp_path / "field", "hci", GRID, views, 50.0, "field")
-    results = results_of(SceneRequest(1, Source(str(tmp_path / "field"))), lambda: CENTRE)
-    assert isinstance(next(results), SceneReady)
-    (tmp_path / "field" / "input_Cam008.png").unlink()
-    seen = []
-    with pytest.raises(InputError, match=r"input_Cam008\.png: no such file"):
-        seen += list(results)
-    message = failure(desk, SceneRequest(2, Source(str(tmp_path / "field"))))
-    assert "input_Cam008.png: this view is missing" in message
-    goes_on(desk, tmp_path, 3)
 
 
 def test_settings_that_are_no_text(tmp_path):

@@ -16,7 +16,7 @@ from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import shows, write_scene
+from tests.viewer.conftest import says, shows, write_scene
 from viewer.model import depth, lens, messages, opening, saving, window
 from viewer.model.action import do
 from viewer.model.saving import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
@@ -32,10 +32,6 @@ def viewer(open_window, photo_path):
     driver.until_idle()
     driver.app.do(do(messages.dismiss))
     return driver
-
-
-def texts(app):
-    return [notice.text for notice in app.state.notices]
 
 
 def export(kind, path, options=SMALL, may_replace=False):
@@ -80,8 +76,8 @@ def test_the_window_stays_usable_and_the_next_export_follows_a_cancelled_one(vie
     assert app.frames_shown - frames >= 5
     assert [job.doing for job in app.state.jobs] == ["drawing frames", ""]
     app.do(do(ask, CancelJobTask(app.state.jobs[0].id)))
-    viewer.until(lambda app: bool(texts(app)) and not app.state.jobs)
-    assert texts(app) == [f"Exported {out}"]
+    viewer.until(lambda app: bool(viewer.texts()) and not app.state.jobs)
+    assert viewer.texts() == [f"Exported {out}"]
     with Image.open(out) as image:
         assert (image.size, image.n_frames) == ((96, 64), 4)
     assert not (tmp_path / "long.gif").exists()
@@ -133,7 +129,7 @@ def test_a_file_shows_what_was_asked_for_whatever_is_changed_meanwhile(viewer, t
     for folder in ("alone", "disturbed"):
         (tmp_path / folder).mkdir()
     app.do(task("alone"))
-    viewer.until(lambda app: bool(texts(app)) and not app.state.jobs)
+    viewer.until(lambda app: bool(viewer.texts()) and not app.state.jobs)
     gate.clear()
     app.do(do(messages.dismiss), task("disturbed"))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
@@ -159,12 +155,12 @@ def test_an_export_asked_for_before_its_views_are_there_outlives_its_photo(open_
     assert [job.doing for job in app.state.jobs] == [WAITING_FOR_VIEWS]
     app.do(other_photo(tmp_path))
     viewer.until(lambda app: not app.state.jobs)
-    assert f"Exported {early}" in texts(app)
+    assert f"Exported {early}" in viewer.texts()
     viewer.until_idle()
     app.do(do(opening.open_source, Source(str(photo_path), grid=GridShape(5, 5))))
     viewer.settle(shows("scene"))
     app.do(do(messages.dismiss), do(lens.set_aperture, 2.0), export("gif", late))
-    viewer.until(lambda app: f"Exported {late}" in texts(app))
+    viewer.until(says(f"Exported {late}"))
     assert bytes_of(early) == bytes_of(late)
 
 
@@ -174,7 +170,7 @@ def test_an_export_asked_for_right_after_an_edit_of_the_depth_shows_it(viewer, t
     inverted = do(depth.set_tone, DepthEdits(is_inverted=True), is_finished=True)
     for out, actions in ((before, ()), (early, (inverted,)), (late, ())):
         app.do(*actions, export("gif", out))
-        viewer.settle(lambda app, out=out: f"Exported {out}" in texts(app))
+        viewer.settle(says(f"Exported {out}"))
     assert bytes_of(before) != bytes_of(early) == bytes_of(late)
 
 
@@ -237,8 +233,8 @@ def test_the_prompt_stays_where_a_place_is_impossible_or_taken(viewer, tmp_path)
     app.do(do(ask, ExportTask(prompt)))
     viewer.until(lambda app: app.state.prompt == replace(prompt, already_there=True))
     assert there.read_text() == "mine"
-    viewer.press(f"Replace {there.name}", "prompt ExportPrompt", until=lambda app: bool(texts(app)))
-    assert texts(app) == [f"Exported {there}"]
+    viewer.press(f"Replace {there.name}", "prompt ExportPrompt", until=lambda app: bool(viewer.texts()))
+    assert viewer.texts() == [f"Exported {there}"]
     assert app.state.prompt is None
     with Image.open(there) as image:
         assert image.size == (192, 64)
@@ -252,7 +248,7 @@ def test_the_options_of_a_kind_are_typed_and_kept_for_the_next(viewer, tmp_path)
     viewer.send("key", "Tab")
     expected = ExportOptions(size=ScreenSize(48, 32), frames=2, rate=10.0)
     viewer.until(lambda app: app.state.prompt == ExportPrompt("gif", str(out), expected))
-    viewer.press("Export", window, until=lambda app: bool(texts(app)))
+    viewer.press("Export", window, until=lambda app: bool(viewer.texts()))
     with Image.open(out) as image:
         assert (image.size, image.n_frames) == ((48, 32), 2)
         assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(image)) == 200

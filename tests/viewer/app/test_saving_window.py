@@ -13,7 +13,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset, image_size
-from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
+from tests.viewer.conftest import HEIGHT, WIDTH, says, write_scene
 from viewer.app.jobs import Jobs
 from viewer.app.picture_files import export_picture, read_settings
 from viewer.app.saving import OPEN_PHOTO
@@ -47,22 +47,18 @@ def start(viewer, path):
     viewer.do(save(path, LARGE), until=lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
-def texts(viewer):
-    return [notice.text for notice in viewer.app.state.notices]
-
-
 def test_the_window_stays_usable_while_a_picture_is_saved(viewer, tmp_path):
     app, out, asked = viewer.app, tmp_path / "out.exr", viewer.app.state
     light = app.scene_view.renderer.converged_picture(RenderSettings(asked.optics, SIZE, is_linear=True))
     app.do(save(out, SIZE))
     app.step()
     frames, turns, shares = app.frames_shown, 0, []
-    while not texts(viewer):
+    while not viewer.texts():
         app.do(do(lens.move_eye, ViewOffset(0.01 * (turns % 50), 0.2)))
         app.step()
         turns += 1
         shares += [job.done for job in app.state.jobs]
-    assert texts(viewer) == [f"Saved {out}"]
+    assert viewer.texts() == [f"Saved {out}"]
     assert shares == sorted(shares)
     assert app.frames_shown - frames >= len(set(shares)) > 2
     stored = read_settings(out)
@@ -81,7 +77,7 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer, tmp_path):
     for _ in range(3):  # the rows settle
         app.step()
     viewer.press(f"Cancel##job {app.state.jobs[0].id}", "notices", until=lambda app: not app.state.jobs)
-    assert texts(viewer) == [f"Saved {tmp_path / 'next.png'}"]
+    assert viewer.texts() == [f"Saved {tmp_path / 'next.png'}"]
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
 
 
@@ -96,7 +92,7 @@ def test_enter_replaces_no_photo_and_a_failure_is_an_error(viewer, tmp_path, mon
         asked = SavePrompt(str(other), TINY, already_there)
         viewer.settle(lambda app, asked=asked: app.state.prompt == asked)
     assert other.read_bytes() == kept
-    viewer.press("Replace other.png", "prompt SavePrompt", until=lambda app: texts(viewer) == [f"Saved {other}"])
+    viewer.press("Replace other.png", "prompt SavePrompt", until=lambda app: viewer.texts() == [f"Saved {other}"])
     assert other.read_bytes() != kept
 
     def fail(*_):
@@ -110,7 +106,7 @@ def test_enter_replaces_no_photo_and_a_failure_is_an_error(viewer, tmp_path, mon
     for may_replace in (False, True):
         app.do(do(messages.dismiss), save(path, may_replace=may_replace, what="map"))
         viewer.until(lambda app: len(app.state.notices) > 0)
-        assert texts(viewer) == [f"Saved {path}"]
+        assert viewer.texts() == [f"Saved {path}"]
 
 
 @pytest.mark.usefixtures("no_dialogs")
@@ -128,7 +124,7 @@ def test_a_bare_name_goes_to_the_folder_that_the_field_showed_and_stays_in_the_l
     saved = photo_path.with_name("small.png")
     assert viewer.app.state.files[0].path == str(saved)
     assert read_settings(saved).optics == viewer.app.state.optics
-    assert texts(viewer) == [f"Saved {saved}"]
+    assert viewer.texts() == [f"Saved {saved}"]
     viewer.app.do(do(messages.dismiss))
     viewer.press("###files", settle=lambda app: app.state.prompt == "files")
     viewer.find("Show in folder##0", "prompt str")
@@ -190,7 +186,7 @@ def test_a_picture_is_saved_at_the_photos_own_size(large, photo_path, tmp_path, 
     prompt = app.state.prompt
     assert prompt.size_px == (WIDTH, HEIGHT)
     app.do(save(out, prompt.size_px))
-    large.until(lambda app: f"Saved {out}" in texts(large))
+    large.until(says(f"Saved {out}"))
     saved, photo = read_photo(out).pixels, read_photo(photo_path).pixels
     assert saved.shape == photo.shape
     if aperture == 0:
@@ -205,5 +201,5 @@ def test_a_photo_that_was_replaced_meanwhile_is_noticed(large, photo_path, tmp_p
     out = tmp_path / "out.png"
     shutil.copy(write_scene(tmp_path, "other", seed=3), photo_path)
     large.app.do(save(out, ScreenSize(WIDTH, HEIGHT)))
-    large.until(lambda app: any("was changed since it was opened" in text for text in texts(large)))
+    large.until(says("was changed since it was opened"))
     assert not out.exists()
