@@ -68,13 +68,6 @@ def test_huawei_maps_lie_as_the_phone_was_held(tmp_path, orientation, stored, wh
     assert any("counts as near" in note for note in found.disparity.notes)
 
 
-@pytest.mark.parametrize("white_is_near", [True, False])
-def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path, white_is_near) -> None:
-    found = opened(tmp_path, "a.jpg", PHOTO + files.picture(SMALL if white_is_near else 255 - SMALL))
-    assert_disc_is_nearest(found)
-    assert any("counts as near" in note for note in found.disparity.notes)
-
-
 def blurred_and_sharp() -> tuple[bytes, bytes]:
     blurred = np.asarray(Image.fromarray(PIXELS).filter(ImageFilter.GaussianBlur(3)))
     return files.picture(blurred), files.picture(PIXELS)

@@ -119,16 +119,9 @@ def refocused(views: dict[ViewOffset, np.ndarray], focus: Focus) -> np.ndarray:
     return picture
 
 
-def inner(picture: np.ndarray, focus: Focus) -> np.ndarray:
-    margin = focus.margin_px
-    return picture[margin:-margin, margin:-margin]
-
-
 def test_foci_lie_where_the_scene_does() -> None:
-    near, middle, far = foci_of(list(offsets_of(5, 5).values())[1:], disparity_of_square())
-    assert (near.name, near.disparity, near.radius) == ("near", 2.0, 2.0)
-    assert (middle.name, middle.disparity) == ("middle", WALL)
-    assert (far.name, far.disparity) == ("far", WALL)
+    foci = foci_of(list(offsets_of(5, 5).values())[1:], disparity_of_square())
+    assert foci == [Focus("near", 2.0, 2.0), Focus("middle", WALL, 2.0), Focus("far", WALL, 2.0)]
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 9), (9, 1), (2, 2), (2, 9)])
@@ -143,7 +136,8 @@ def test_few_views_and_one_pixel_are_no_lens(rows, columns) -> None:
 def test_a_made_field_refocuses_as_the_lens_does(name) -> None:
     scene = lens_scene(name)
     focus = Focus("lens", scene.lens.focus_disparity, scene.lens.radius_views)
-    lens = inner(scene.lens.picture, focus)
+    margin = focus.margin_px
+    lens = scene.lens.picture[margin:-margin, margin:-margin]
     true = {GRID.offset(*index): view for index, view in scene.views.items()}
     updates = generate(scene.photo, scene.disparity, literal_plan(scene.photo, scene.disparity, *GRID))
     made = {GRID.offset(update.row, update.column): encoded_from_stored(update.colors) for update in updates}

@@ -100,18 +100,6 @@ def test_views_in_any_order_give_the_same_disparity(tmp_path: Path, name: str) -
     assert all(found.endswith(note) for found in notes)
 
 
-@pytest.mark.parametrize(("row_step", "jitter", "gap"), [(0.4, 0.0, "_"), (1.0, 0.15, "_"), (1.0, 0.15, "__")])
-def test_positions_in_names_are_used_as_they_are(tmp_path: Path, row_step: float, jitter: float, gap: str) -> None:
-    rng = np.random.default_rng(3)
-    names: Names = {}
-    for row, column in grid(5, 5):
-        t, s = np.array(centred(row, column, row_step=row_step)) + rng.uniform(-jitter, jitter, 2)
-        names[f"out_{row:02d}_{column:02d}{gap}{10 * t:.6f}_{10 * s:.6f}_"] = (t, s)
-    _, values, _ = find_disparity(Source(str(write_views(tmp_path / "field", names))))
-    assert np.median(np.abs(values[28:44, 40:56] - SQUARE_PX)) < 0.1
-    assert np.median(np.abs(values[:, :20] - WALL_PX)) < 0.1
-
-
 def test_what_the_user_says_about_the_order_counts(tmp_path: Path) -> None:
     folder = write_views(tmp_path / "field", FIELDS["from behind"][0])
     named = Arrangement("rows", GridShape(5, 5), "none", 1.0)
