@@ -13,7 +13,7 @@ from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options, Result, evaluate
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.report import figures_table, write_report
+from iibr_core.evaluation.report import figures_table, summary_table, write_report
 from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
@@ -103,6 +103,13 @@ def test_refocus_and_lpips_of_a_rendered_scene(networks) -> None:  # noqa: F811
     assert all(ours.refocus_db[name] > photo.refocus_db[name] + 3 for name in ours.refocus_db)
     assert 0 < ours.mean.lpips < photo.mean.lpips
     assert {"LPIPS", "near focus dB", "consistency"} <= set(figures_table(result).head)
+
+
+def test_several_scenes_have_a_mean_of_their_centre_trials(results) -> None:
+    centre, corner = results
+    *_, row = summary_table([centre, corner, centre]).rows
+    assert row[:2] == ("mean of 2 scenes", CENTRE_TRIAL)
+    assert row[3:] == summary_table([centre]).rows[0][3:]
 
 
 def test_a_report_holds_every_figure_and_needs_no_other_file(results, tmp_path) -> None:
