@@ -128,6 +128,7 @@ def test_edits_change_no_parallax_elsewhere(static, strength) -> None:
     edited = apply_depth_settings(loaded, DepthSettings(False, stroke))
     before, after = make_plan(source, loaded, strength), make_plan(source, edited, strength)
     assert np.ptp(edited.disparity.values) > 2.5
+    assert sum(edited.levels.counts) == edited.disparity.values.size, "the histogram counts every pixel once"
     elsewhere = np.s_[45:, :]
     unchanged = before.field_disparity(loaded.disparity).values[elsewhere]
     np.testing.assert_allclose(after.field_disparity(edited.disparity).values[elsewhere], unchanged, atol=1e-4)
