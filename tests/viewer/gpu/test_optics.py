@@ -114,6 +114,25 @@ def test_highlights_behind_an_edge_count_for_more_too(renderer):
     assert (bright[inside] - bright[32, 48]).mean() == pytest.approx((1 + HIGHLIGHT_GAIN) * wall_share, rel=0.1)
 
 
+def test_a_small_light_far_out_of_focus_spreads_over_many_blocks(renderer):
+    """A lamp before a dark wall in focus; what stands between them elsewhere gives the blur slices of its own."""
+    size, middle = (320, 96), (48.0, 103.0)
+    y, x = np.indices(size[::-1]) + 0.5
+    is_lamp, is_between = np.maximum(abs(y - middle[0]), abs(x - middle[1])) < 4, abs(x - 275) < 25
+    disparity = np.select([is_lamp, is_between], [6.0, 3.0], 0.0).astype(np.float32)
+    open_field(renderer, GridShape(1, 1), *size)
+    renderer.field.upload(0, 0, (255 * is_lamp[..., None]).astype(np.uint8).repeat(3, -1), disparity)
+    dark = np.zeros((*size[::-1], 3), np.float32)
+    renderer.field.set_hidden(HiddenSurface(dark, np.zeros_like(disparity), disparity > 0))
+    optics = Optics(aperture_diameter=12.0)
+    picture = renderer.converged_picture(RenderSettings(optics, size, is_linear=True))[..., 0]
+    away = np.hypot(y - middle[0], x - middle[1])
+    expected = is_lamp.sum() / (np.pi * 36**2)
+    assert picture[away < 30].mean() == pytest.approx(expected, rel=0.05)
+    assert picture[(away > 26) & (away < 30)].min() > 0.5 * expected
+    assert picture[away > 42].max() < 0.1 * expected
+
+
 def test_nothing_shines_through_a_surface_that_lies_close_before_it(renderer):
     """A dark wall that comes towards the eye, a bright one a little behind it: their discs are nearly the same."""
     size = (96, 64)
