@@ -124,6 +124,7 @@ class Driver:
         """Turn the loop until every view is there and nothing is left to do; what was sent before is heard first."""
         self.app.step()
         self.until(lambda app: has_all_views(app.state) and rests(app))
+        return self
 
     def settle(self, condition):
         """Turn the loop until the condition holds, and until nothing is left to do."""
@@ -303,8 +304,8 @@ def wide_window(monkeypatch):
 
 @pytest.fixture
 def open_window(display, no_egl_context):
-    """Opens the viewer on a photo's path, or None; kept_in: where preferences are kept; changes: of the `Source`. The
-    sections that are used most are open; the window closes after the test.
+    """Opens the viewer on a photo's path, or None; kept_in: where preferences are kept; changes: of the `Source`, which
+    has 3x3 views. The sections that are used most are open; the window closes after the test.
     """
     from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
@@ -315,7 +316,7 @@ def open_window(display, no_egl_context):
     sections = with_sections((), "view", "focus", "aperture", "light")
 
     def start(path, kept_in=None, **changes):
-        state = initial_state(Source(str(path), **changes)) if path else None
+        state = initial_state(Source(str(path), **{"grid": GridShape(3, 3)} | changes)) if path else None
         preferences = Preferences(window=SMALL_WINDOW, open_sections=sections)
         apps.append(App(replace(state or AppState(), preferences=preferences, hides_panel=False), kept_in))
         return Driver(apps[-1])

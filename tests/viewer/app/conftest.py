@@ -2,15 +2,13 @@
 
 import pytest
 
-from iibr_core.types import GridShape
-
 
 @pytest.fixture
 def viewer(request, open_window, photo_path):
     """All views of the photo are there; the pointer rests in the picture, off the near square. OPEN_SECTIONS of the
     module: of the panel, those that are used most if none.
     """
-    driver = open_window(photo_path, grid=GridShape(3, 3))
+    driver = open_window(photo_path)
     if sections := getattr(request.module, "OPEN_SECTIONS", ()):
         driver.open_sections(*sections)
     driver.until_idle()

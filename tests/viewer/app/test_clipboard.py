@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import InputError
 from tests.viewer.conftest import says, write_scene
 from viewer.app.clipboard import MAX_PASTED, paste_picture
 from viewer.model import lens
@@ -28,6 +28,8 @@ def put(data, kind="UTF8_STRING"):
     """Into the clipboard, by another program."""
     quiet = subprocess.DEVNULL
     subprocess.run([*CLIPBOARD, "-t", kind, "-i"], input=data, stdout=quiet, stderr=quiet, check=True)
+    while subprocess.run([*CLIPBOARD, "-t", kind, "-o"], stdout=subprocess.PIPE, stderr=quiet).stdout != data:
+        pass  # the program before may still answer
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00\xff\xfe" * 9, a_picture()[:-40]])
@@ -47,8 +49,7 @@ def test_old_pasted_pictures_go(display, tmp_path, monkeypatch):
 def test_pictures_and_paths_are_copied_and_pasted(open_window, photo_path, tmp_path, monkeypatch):
     """What is pasted at once waits until it is copied; words change nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    viewer = open_window(photo_path, grid=GridShape(3, 3))
-    viewer.until_idle()
+    viewer = open_window(photo_path).until_idle()
     viewer.app.do(do(lens.set_aperture, 2.0))
     put(b"some words")
     viewer.send("key", "ctrl+c", "key", "ctrl+v")

@@ -28,8 +28,7 @@ LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)
 
 @pytest.fixture
 def viewer(open_window, photo_path):
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
+    driver = open_window(photo_path).until_idle()
     driver.app.do(do(messages.dismiss))
     return driver
 

@@ -73,8 +73,7 @@ def open_photos(display, tmp_path, monkeypatch):
 
 
 def test_later_starts_open_their_photos_in_the_window_that_is_there(open_photos, open_window, photos):
-    driver = open_window(photos["a"])
-    driver.until_idle()
+    driver = open_window(photos["a"]).until_idle()
     driver.app.receiver.listen()
     for paths, shown in ((["b"], "b"), (["c", "a", "b"], "c"), ([], "c")):
         assert open_photos(*(photos[name] for name in paths)).returncode == 0

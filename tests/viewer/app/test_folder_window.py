@@ -20,7 +20,7 @@ from viewer.model.action import do
 def viewer(open_window, tmp_path):
     for i in range(3):
         write_scene(tmp_path, f"photo{i}", seed=i)
-    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver = open_window(tmp_path)
     driver.settle(lambda app: app.state.folder is not None)
     return driver
 
@@ -48,7 +48,7 @@ def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer, tmp_p
 
 def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_window, tmp_path):
     paths = [write_large_photo(tmp_path, f"photo{i}") for i in range(3)]
-    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver = open_window(tmp_path)
     driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
     driver.until(lambda app: app.scene_view.picture_drawn is not None)
     driver.until(lambda app: not app.state.scene.is_sketch)
@@ -69,7 +69,7 @@ def test_photos_that_cannot_be_read_have_their_names_in_the_filmstrip_and_keys_g
     write_scene(tmp_path, "photo3")
     for path in (first, bad):
         path.write_bytes(b"no photo")
-    driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver = open_window(tmp_path)
     driver.until(lambda app: app.state.folder is not None)
     assert driver.app.state.scene is None
     driver.key("Page_Down", settle=shows("photo1"))

@@ -60,7 +60,7 @@ def downloaded(hub):
 @pytest.fixture
 def viewer(hub, open_window, tmp_path):
     """A photo without depth, and what to do about that."""
-    return with_offer(open_window(write_photo(tmp_path / "photo.png"), grid=GRID))
+    return with_offer(open_window(write_photo(tmp_path / "photo.png")))
 
 
 def with_offer(driver):
@@ -141,7 +141,7 @@ def test_without_a_connection_a_download_says_so_with_details(viewer, monkeypatc
 
 
 def test_a_model_that_is_here_is_used_unasked_unless_that_is_switched_off(downloaded, open_window, tmp_path):
-    driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
+    driver = open_window(write_photo(tmp_path / "photo.png"))
     driver.settle(is_deep)
     assert offered_model(driver.app.state) is None
     source = source_beside(driver.app.state.source, str(write_photo(tmp_path / "other.png", seed=9)))
@@ -193,7 +193,7 @@ def test_a_running_estimate_is_given_up_by_one_click(downloaded, open_window, tm
     is_running = Event()
     with monkeypatch.context() as patched:
         patched.setattr("iibr_core.scenes.photo.deepen", wait_to_be_stopped)
-        viewer = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
+        viewer = open_window(write_photo(tmp_path / "photo.png"))
         viewer.until(lambda app: is_running.is_set())
         viewer.press("Cancel##estimate", "notices", until=lambda app: depth_models.wanted_model(app.state) is None)
         viewer.press("Depth guessed", "Depth guessed")
@@ -226,7 +226,7 @@ def test_a_copied_model_is_listed_and_used_for_photos_without_depth(hub, open_wi
     """As after `iibr models get FILE.onnx`."""
     monkeypatch.setattr("iibr_core.depth.models.catalog.own_models_folder", lambda: tmp_path / "copied")
     register(weighing(tmp_path / "mine.onnx", (1, 1, 1)))
-    driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
+    driver = open_window(write_photo(tmp_path / "photo.png"))
     driver.until(is_deep)
     assert driver.app.state.scene.depth_model == "mine"
     driver.do(do(depth_models.show_models))
@@ -243,7 +243,7 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
     photo, kept = write_photo(tmp_path / "photo.png"), tmp_path / "kept"
     file = weighing(tmp_path / "own.onnx", (1, 1, 1))
-    first = with_offer(open_window(photo, kept_in=kept, grid=GRID))
+    first = with_offer(open_window(photo, kept_in=kept))
     first.app.do(do(depth_models.use_model, str(file)))
     first.until(is_deep)
     first.until(lambda app: bool(list((kept / "sessions").glob("*.json"))))
@@ -255,7 +255,7 @@ def test_a_photo_opens_with_the_model_and_the_focus_that_it_was_left_with(
     first.app.close()
     if is_lost:
         file.unlink()
-    second = open_window(photo, kept_in=kept, grid=GRID)
+    second = open_window(photo, kept_in=kept)
     second.app.state = replace(second.app.state, preferences=replace(second.app.state.preferences, depth_model=""))
     second.until(lambda app: bool(app.state.notices))
     (notice,) = second.app.state.notices

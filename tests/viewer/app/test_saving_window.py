@@ -12,7 +12,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, InputError, ViewOffset, image_size
+from iibr_core.types import InputError, ViewOffset, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, says, write_scene
 from viewer.app.jobs import Jobs
 from viewer.app.picture_files import export_picture, read_settings
@@ -32,8 +32,7 @@ def viewer(open_window, photo_path, monkeypatch):
     """One small step of a picture a turn, and many passes: so there are many turns however fast the machine is."""
     monkeypatch.setattr("viewer.app.side_effects.SAVE_BUDGET_S", 0.0)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
-    driver = open_window(photo_path, grid=GridShape(3, 3))
-    driver.until_idle()
+    driver = open_window(photo_path).until_idle()
     driver.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0))
     return driver
 
@@ -173,8 +172,7 @@ def test_closing_the_window_waits_for_what_is_being_written(viewer, tmp_path, mo
 @pytest.fixture
 def large(open_window, photo_path):
     """The photo is four times as large as its views."""
-    driver = open_window(photo_path, grid=GridShape(3, 3), max_pixels=WIDTH * HEIGHT // 4)
-    driver.until_idle()
+    driver = open_window(photo_path, max_pixels=WIDTH * HEIGHT // 4).until_idle()
     return driver
 
 

@@ -62,8 +62,7 @@ def write_session(kept, photo_path, text):
 
 
 def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window, photo_path, tmp_path):
-    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-    first.until_idle()
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE).until_idle()
     assert not sessions_in(tmp_path / "kept"), "the user did nothing yet"
     change(first)
     first.until(lambda app: bool(sessions_in(tmp_path / "kept")) and rests(app))
@@ -101,8 +100,7 @@ def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(open_window, phot
     first.app.close()
     (session,) = sessions_in(tmp_path / "kept")
     kept = session.read_text("utf-8")
-    driver = open_window(photo_path, grid=ONE)
-    driver.until_idle()
+    driver = open_window(photo_path, grid=ONE).until_idle()
     state, other = driver.app.state, Source(str(tmp_path / "other.png"))
     store = SessionStore(tmp_path / "kept", lambda: None)
     while not store.advance(state):
@@ -179,8 +177,7 @@ def test_of_too_many_sessions_the_oldest_go(open_window, photo_path, tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_gives_one_notice(open_window, photo_path, tmp_path):
-    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-    driver.until_idle()
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE).until_idle()
     (tmp_path / "kept" / "sessions").write_text("a file is in the way")
     change(driver)
     driver.until(says("not kept"))

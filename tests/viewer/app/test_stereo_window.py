@@ -17,7 +17,7 @@ from iibr_core.exports.framing import centred, size_in_frame
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.lenticular import Calibration
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import ViewOffset
 from tests.fake_bridge import PORTRAIT, fake_bridge
 from tests.viewer.conftest import Driver
 from tests.xvfb import display_with_monitors
@@ -141,7 +141,7 @@ def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(vi
 
 
 def test_monitor_and_arrangement_are_remembered(open_window, photo_path, tmp_path):
-    first = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
+    first = open_window(photo_path, tmp_path)
     first.until(lambda app: app.state.scene is not None)
     wanted = first.app.state.monitors[1]
     assert replace(wanted, width_mm=0) == Monitor("DUMMY1", FIRST.width, 0, *SECOND)
@@ -150,7 +150,7 @@ def test_monitor_and_arrangement_are_remembered(open_window, photo_path, tmp_pat
     first.close()
     kept = load_preferences(AppState(), tmp_path).preferences
     assert (kept.stereo_mode, kept.swaps_eyes, kept.stereo_monitor) == ("rows", True, wanted)
-    second = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
+    second = open_window(photo_path, tmp_path)
     second.do(do(stereo.show, True), until=lambda app: app.stereo_screen.second is not None)
     assert second.app.stereo_screen.second.monitor == wanted
 

@@ -32,7 +32,7 @@ def icon_sizes(driver):
 
 
 def test_the_first_picture_comes_before_the_views(open_window, photo_path):
-    driver = open_window(photo_path)
+    driver = open_window(photo_path, grid=None)
     driver.until(lambda app: app.frames_shown > 0)
     assert icon_sizes(driver) == [], "it would delay the picture"
     driver.until(lambda app: app.scene_view.pictures_drawn > 0)
@@ -147,8 +147,7 @@ def test_a_window_opens_where_it_was_left_and_no_larger_than_the_screen(open_win
 
 def test_views_come_nearest_first_to_where_the_user_looks(open_window, photo_path):
     """From the hand to the worker: the viewpoint in a corner, the views made again."""
-    driver = open_window(photo_path, grid=GridShape(9, 9))
-    driver.until_idle()
+    driver = open_window(photo_path, grid=GridShape(9, 9)).until_idle()
     before = driver.app.state.scene
     driver.app.do(do(lens.move_eye, ViewOffset(-4.0, -4.0)), do(lens.set_depth_strength, 1.5, is_finished=True))
     driver.until(lambda app: app.state.scene is not before)

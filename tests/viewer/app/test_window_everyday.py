@@ -64,8 +64,7 @@ def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer, tmp_path):
 
 def test_what_was_chosen_is_there_again_the_next_time(open_window, photo_path, tmp_path):
     kept = tmp_path / "kept"
-    first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
-    first.until_idle()
+    first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1)).until_idle()
     first.press("###section More", settle=lambda app: "more" in app.state.preferences.open_sections)
     preferences = first.app.state.preferences
     assert load_preferences(AppState(), kept).preferences.open_sections == preferences.open_sections, "after a crash"

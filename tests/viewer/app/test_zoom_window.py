@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import ViewOffset
 from tests.viewer.conftest import NEAR, says
 from viewer.background.newest import Newest
 from viewer.model import lens, viewpoint
@@ -59,8 +59,7 @@ def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer):
 
 
 def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window, photo_path):
-    viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
-    viewer.until_idle()
+    viewer = open_window(photo_path, max_pixels=24 * 16).until_idle()
     app, photo = viewer.app, read_photo(photo_path).pixels * 255
     zoom_to(viewer, Zoom(1.0))
     sharp = until_sharp(viewer)
@@ -80,8 +79,7 @@ def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window
 
 
 def test_a_photo_that_is_gone_is_reported_once_and_the_views_stay(open_window, photo_path, monkeypatch):
-    viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
-    viewer.until_idle()
+    viewer = open_window(photo_path, max_pixels=24 * 16).until_idle()
     photo_path.unlink()
     zoom_to(viewer, Zoom(1.0))
     viewer.settle(says("full detail"))
