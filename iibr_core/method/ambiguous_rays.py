@@ -94,7 +94,7 @@ def find_ambiguous_rays(
     if not every:
         asked = asked.copy()
         _keep_open_rays(candidates, weights, rays.photo_images, asked)
-    pixel = np.argwhere(asked)
+    pixel = np.stack(np.divmod(np.flatnonzero(asked), asked.shape[1]), axis=1)
     shape = len(pixel), HYPOTHESES
     found = AmbiguousRays(
         candidates.offset,
@@ -137,8 +137,10 @@ def _keep_open_rays(candidates, weights, photo_images, asked):
         # Band rows count from first_row, cells from the picture's first row.
         cell_row = (y + candidates.first_row % CELL_PX) // CELL_PX
         for x in range(width):
-            if not asked[y, x] or smooth[cell_row, x // CELL_PX]:
-                asked[y, x] = False
+            # Most rays lie in smooth cells, which are passed over as a whole.
+            if x % CELL_PX == 0 and smooth[cell_row, x // CELL_PX]:
+                asked[y, x : x + CELL_PX] = False
+            if not asked[y, x]:
                 continue
             heaviest, covered, fringed = 0.0, 0.0, False
             for k in range(np.int64(number[y, x])):
