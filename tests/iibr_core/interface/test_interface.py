@@ -201,7 +201,6 @@ BAD = {
     "a photo that is not there": lambda p, d: iibr.open("nowhere.png"),
     "literal with a strength": lambda p, d: iibr.from_arrays(p, d).light_field(3, parallax="literal", depth_strength=2),
     "a layout that is none": lambda p, d: iibr.from_arrays(p, d).light_field(3).save("a", "zip"),
-    "a model that is none": lambda p, d: iibr.estimate_depth(p, "no-such-model"),
 }
 
 
@@ -234,3 +233,5 @@ def test_depth_is_estimated_by_contours_alone_and_photos_are_read_smaller(photo_
     guess = iibr.estimate_depth(pixels, "guess")
     assert guess.shape == (60, 80)
     assert guess[-10:].mean() > guess[:10].mean(), "the ground is near"
+    with pytest.raises(InputError, match="no-such-model"):
+        iibr.estimate_depth(pixels, "no-such-model")
