@@ -35,6 +35,7 @@ from iibr_core.formats.files import MAX_FILE_BYTES, read_bytes
 from iibr_core.formats.images.avif import avif_depth_file
 from iibr_core.formats.images.file_kinds import Kind
 from iibr_core.formats.images.heic import heic_info, heic_orientation, read_heic_depth
+from iibr_core.formats.images.jpeg_xl import has_depth_channel
 from iibr_core.formats.images.lfp import open_lfp
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.photo import read_photo
@@ -197,6 +198,8 @@ def unread_parts(path: Path) -> tuple[str, ...]:
     """
     listed = heic_info(path).get("aux") or () if open_picture(path).kind == "HEIC" else ()
     parts = _mattes(" ".join(map(str, listed)).encode()) + _unread_in_jpeg(_jpeg_bytes(path))
+    if has_depth_channel(path):
+        parts.append(f"a depth channel (save it, for example with djxl, as {path.stem}_depth.png)")
     return tuple(f"{path.name} holds {part}; this is not read." for part in parts)
 
 

@@ -1,3 +1,4 @@
+import base64
 import json
 import zipfile
 from pathlib import Path
@@ -8,6 +9,7 @@ from PIL import Image, ImageFilter
 
 from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
+from iibr_core.formats.images.jpeg_xl import has_depth_channel
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.types import InputError
@@ -168,6 +170,27 @@ def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path) -> None:
     for data in (PHOTO, PHOTO + gain, listed, PHOTO + b"some other trailer", b"no photo"):
         path.write_bytes(data)
         assert unread_parts(path) == ()
+
+
+JPEG_XL = (
+    "AAAADEpYTCANCocKAAAAFGZ0eXBqeGwgAAAAAGp4bCAAAAAJanhsbAoAAADCanhsY/8KD8EEKrIyODo0CQgIEACgAksoNCa+5nOS"
+    "UFBQUHIBFBSow4BjjFFRKNsY8y4TC0BExRjMO+ReXswYgyl7ARkAgE7EAQIDKAKKRrqQ2DIyEBhzHDAPI+aBAnHEPIRn89LQkAUX"
+    "wgRUa6pq9c7wtls+f588RMsACn3QUhCNodcCZ1CHz1QEXrJoEIk+XbPBVql5J6cQPo5GIHzsXlqqWqzrn1BpwkMQbuPdHJcXtTS3"
+    "Mo0mBpAlN+dCAg=="
+)
+"""A picture of 96x64 pixels with a further channel of depth."""
+
+
+def test_a_channel_of_depth_in_jpeg_xl_is_named(tmp_path) -> None:
+    data = base64.b64decode(JPEG_XL)
+    found = opened(tmp_path, "a.jxl", data)
+    assert found.origin.kind == "rough"
+    (note,) = (note for note in found.disparity.notes if "depth channel" in note)
+    assert "a_depth.png" in note
+    codestream = data[data.index(b"\xff\x0a") :]
+    for start, has_depth in ((codestream, True), (codestream[:5], False), (data[:40], False)):
+        (tmp_path / "b.jxl").write_bytes(start)
+        assert has_depth_channel(tmp_path / "b.jxl") is has_depth
 
 
 # ---- Record3D
