@@ -82,7 +82,7 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
     """Draw the colours with their values, and a mark for the value under the pointer."""
     kind, scale, hover = state.inspection.overlay, layout.ui_scale, state.hover
     x, y, room = frame.x + 8 * scale, frame.y + 8 * scale, 5 * scale
-    if has_guess_badge(state, layout):
+    if has_guess_badge(state, layout) or state.free_camera is not None:  # a chip stands there
         y += imgui.get_frame_height() + 8 * scale
     if kind == "inpainted" or state.selection is not None:
         draw_words("inpainting" if state.selection is None else "selected surface", x, y, scale)
