@@ -34,6 +34,7 @@ MIN_PSNR_DB, MIN_WITH_APERTURE_DB = 46.0, 48.0
 """The page is no nearer to the desktop than its compressed views are; an aperture averages over them."""
 MIN_PSNR_OF_NOISE_DB = 38.0
 """The same for a page of fine noise: 40.3 dB were measured at least."""
+FOCUS = "document.getElementById('focus').valueAsNumber"
 BLOCK_PX, MAX_IN_BLOCK = 8, 8.0
 """A seam would change the whole of some block, of 255; compression changes each by less."""
 
@@ -154,12 +155,21 @@ def test_fingers_on_a_phone_move_the_viewpoint_and_zoom(tab, page) -> None:
     wait_until_still(tab)
     moved = canvas(tab)
     assert psnr(first, moved) < 40
+    touch("touchStart", (20, 300))
+    touch("touchEnd")
+    far = tab.evaluate(FOCUS)
     touch("touchStart", (180, 420), (200, 420))
     for apart in (20, 60, 100):
         touch("touchMove", (180 - apart, 420), (200 + apart, 420))
     touch("touchEnd")
     wait_until_still(tab)
     assert psnr(canvas(tab), moved) < 25
+    touch("touchStart", (195, 300))
+    touch("touchEnd")
+    assert tab.evaluate(FOCUS) > far, "enlarged, the square fills the picture"
+    tab.press("r")
+    wait_until_still(tab)
+    assert psnr(canvas(tab), first) > 40, "the whole picture again"
 
 
 def test_a_page_cut_off_in_its_data_says_so(tab, page, tmp_path) -> None:

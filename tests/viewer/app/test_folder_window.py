@@ -84,6 +84,9 @@ def test_the_filmstrip_shows_all_photos_and_opens_one(viewer, tmp_path):
     paths = tuple(str(tmp_path / f"photo{i}.png") for i in range(3))
     viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
     viewer.settle(shows("photo0"))
+    tile = middle_tile(viewer.app).astype(int)
+    square = np.ptp(np.argwhere(tile[..., 0] > tile[..., 1] + 100), axis=0) + 1
+    assert square == pytest.approx([viewer.app.layout().filmstrip.height / 2] * 2, abs=9), "as large as it fits"
     viewer.press("photo photo2.png", "filmstrip", settle=shows("photo2"))
     generation = viewer.app.state.generation
     viewer.press("photo photo2.png", "filmstrip")

@@ -86,4 +86,5 @@ def test_who_has_no_home_folder_is_not_asked_to_choose_another(tmp_path):
     keeper = PreferencesKeeper(AppState(), tmp_path / "file" / "folder")
     (notice,) = reduce(AppState(), keeper.keep(AppState())[0]).notices
     assert notice.text.startswith("Settings and recent photos are not kept. ")
+    assert notice.is_error
     assert "choose" not in notice.text

@@ -21,6 +21,7 @@ from viewer.model import lens, messages, saving
 from viewer.model.action import do
 from viewer.model.saving import WRITING, SavePrompt
 from viewer.model.tasks import PlainTask, SaveTask, ask
+from viewer.ui.overlays.prompt_rows import BROWSE
 
 SIZE = ScreenSize(150, 100)
 LARGE = ScreenSize(1500, 1000)
@@ -31,6 +32,7 @@ TINY = ScreenSize(48, 32)
 def viewer(open_window, photo_path, monkeypatch):
     """One small step of a picture a turn, and many passes: so there are many turns however fast the machine is."""
     monkeypatch.setattr("viewer.app.side_effects.SAVE_BUDGET_S", 0.0)
+    monkeypatch.setattr("viewer.app.main_loop.has_dialogs", lambda: True)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
     driver = open_window(photo_path).until_idle()
     driver.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0))
@@ -86,6 +88,7 @@ def test_enter_replaces_no_photo_and_a_failure_is_an_error(viewer, tmp_path, mon
     kept = other.read_bytes()
     app.do(do(messages.show_prompt, SavePrompt(str(other), TINY)))
     viewer.until_idle()
+    viewer.find(BROWSE, "prompt SavePrompt")
     for already_there in (True, False, True):
         viewer.send("key", "Return")
         asked = SavePrompt(str(other), TINY, already_there)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import glfw
 import numpy as np
 import pytest
 from imgui_bundle import imgui
@@ -68,6 +69,9 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window, photo_path, t
     first.press("###section More", settle=lambda app: "more" in app.state.preferences.open_sections)
     preferences = first.app.state.preferences
     assert load_preferences(AppState(), kept).preferences.open_sections == preferences.open_sections, "after a crash"
+    glfw.set_window_pos(first.app.window.handle, 40, 50)
+    first.until(lambda app: app.state.preferences.window[:2] == (40, 50))
+    preferences = first.app.state.preferences
     first.close()
     second = open_window(None, kept_in=kept)
     second.until(lambda app: app.frames_shown > 0)

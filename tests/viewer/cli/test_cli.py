@@ -267,6 +267,9 @@ def test_plan_names_what_views_are_recognised_as(iibr, photo_path, tmp_path, nam
     assert f"- Views: {views}." in reasons
     assert ("- Disparity goes from 1.25 to 1.25 px per view step." in reasons) == (name == "field")
     assert "do not fill a grid of 5x7" in refusal_of(iibr("plan", path, "--grid", "5x7"))
+    if name == "field":
+        given = "--disparity", photo_path.with_name("scene_disparity.npy"), "--disparity-scale", 2
+        assert "- Disparity goes from -2.00 to 4.00 px per view step." in output_of(iibr("plan", path, *given))
 
 
 def test_plan_says_where_views_fill_no_grid(iibr, tmp_path):

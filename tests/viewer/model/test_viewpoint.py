@@ -64,6 +64,7 @@ def test_the_glide_home_is_short_monotone_and_ends_exactly_there():
     distances = [math.hypot(*state.optics.eye) for state in states]
     assert distances[0] == math.hypot(2, 3)
     half = min(states, key=lambda state: abs(state.optics.dolly - 0.75))
+    assert half.optics.dolly == pytest.approx(0.75, abs=0.2)
     assert math.hypot(*half.optics.eye) / distances[0] == pytest.approx(half.optics.dolly / 1.5), "both at once"
     assert all(a >= b for a, b in itertools.pairwise(distances))
     assert (states[-1].optics.eye, states[-1].optics.dolly) == (ViewOffset(0, 0), 0.0)

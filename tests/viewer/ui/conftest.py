@@ -28,13 +28,14 @@ WINDOW = ScreenSize(1280, 800)
 
 @dataclass(frozen=True)
 class Item:
-    """A widget as it was laid out. words: drawn in it, on one line."""
+    """A widget as it was laid out. words: drawn in it, on one line. ends: of a slider."""
 
     kind: str
     window: str
     name: str
     words: str
     value: Any
+    ends: Any
     left: float
     top: float
     right: float
@@ -52,8 +53,8 @@ class Built(list[Item]):
         """Note the widget that was built last."""
         low, high, words = imgui.get_item_rect_min(), imgui.get_item_rect_max(), words_of(kind, arguments)
         window, width = imgui.internal.get_current_window_read().name, imgui.calc_text_size(words).x
-        value = arguments[1] if len(arguments) > 1 else None
-        self.append(Item(kind, window, str(arguments[0]), words, value, low.x, low.y, high.x, high.y, width))
+        value, ends = arguments[1] if len(arguments) > 1 else None, arguments[2:4]
+        self.append(Item(kind, window, str(arguments[0]), words, value, ends, low.x, low.y, high.x, high.y, width))
 
     def names(self, *kinds, window="panel"):
         """Return the names of the widgets of these kinds in a window."""

@@ -33,7 +33,8 @@ def state_of(section, *actions, units="photographic", scene=SCENE):
 
 SHAPE = do(lens.set_aperture_shape, replace(state_of("more").optics.aperture_shape, kind="polygon"))
 RING, CAT = (do(lens.set_aperture_shape, replace(SHAPE.args[0], kind=kind)) for kind in ("ring", "cat_eye"))
-GLOSSY = do(lens.set_gloss, replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, nearest=0.4)))
+WARM = replace(FIRST_GLOSS.light, color=(0.5, 0.25, 0.25))
+GLOSSY = do(lens.set_gloss, replace(FIRST_GLOSS, light=WARM, surface=replace(FIRST_GLOSS.surface, nearest=0.4)))
 GLOSS_BRUSH = do(lens.take_gloss_brush, GlossBrush(is_on=True))
 BRUSH, BUCKET, LEVEL = (
     do(depth.set_brush, Brush(tool, is_on=True, sample=DepthSample((0.5, 0.5), 1.0)))
@@ -57,7 +58,7 @@ SLIDERS = [
     ("light", (), "##Highlights", 40.0, "optics.highlight_recovery", 0.4),
     ("gloss", (GLOSSY,), "##Roughness", 60.0, "optics.gloss.roughness", 0.6),
     ("gloss", (GLOSSY,), "##Reflects", 60.0, "optics.gloss.reflectance", 0.6),
-    ("gloss", (GLOSSY,), "##Brightness", 2.0, "optics.gloss.light.color", (2.0, 2.0, 2.0)),
+    ("gloss", (GLOSSY,), "##Brightness", 2.0, "optics.gloss.light.color", (2.0, 1.0, 1.0)),
     ("gloss", (GLOSSY,), "##Light size", 3.0, "optics.gloss.light.radius_deg", 3.0),
     ("gloss", (GLOSSY,), "##From far", 60.0, "optics.gloss.surface.nearest", 0.6),
     ("gloss", (GLOSSY,), "##To near", 30.0, "optics.gloss.surface.nearest", 0.3),
@@ -94,6 +95,7 @@ def test_a_slider_sets_its_number_and_shows_it(operated, built, row, units):
     operated(after)
     (item,) = [item for item in built if item.name == widget]
     assert item.value == pytest.approx(shown)
+    assert item.ends[0] <= shown <= item.ends[1]
 
 
 def test_the_distance_of_the_focus_is_relative_to_what_stays_still(operated):
