@@ -61,7 +61,8 @@ def test_viewpoints_lie_about_the_middle_of_an_even_grid(source, tmp_path, kind,
         return np.zeros((settings.size_px.height, settings.size_px.width, 3), np.uint8)
 
     even = replace(source, scene=replace(source.scene, grid=GridShape(4, 4)), draw=draw)
-    exported(even, kind, tmp_path / "a.png", {"focus_disparity": 3.0}, **options)
+    exported(even, kind, tmp_path / "a.png", {"focus_disparity": 3.0, "eye": ViewOffset(0.5, 1.0)}, **options)
+    assert {settings.optics.eye.t for settings in drawn} == {0.5}, "all are seen from as high as the window's picture"
     assert (drawn[0].optics.eye.s, drawn[-1].optics.eye.s) == pytest.approx((first, last))
     shift_px = [96 * (settings.part.x + settings.part.width / 2 - 0.5) for settings in (drawn[0], drawn[-1])]
     assert shift_px == pytest.approx([-3.0 * first, -3.0 * last]), "the focused surface stays in place"

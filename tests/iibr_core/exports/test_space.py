@@ -15,6 +15,7 @@ from iibr_core.exports.cameras import cameras_of, colors_of
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.formats.maps.writer import KEY, text_from
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.exports.conftest import exported
@@ -102,7 +103,9 @@ def test_maps(source, tmp_path) -> None:
     disparity = read_pfm(exported(source, "disparity", tmp_path / "a.pfm"))
     out = exported(source, "depth", tmp_path / "a.exr")
     assert out.name == "a_depth.exr"
-    depth = np.asarray(oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT))[..., 0]
+    file = oiio.ImageBuf(str(out))
+    depth, text = np.asarray(file.get_pixels(oiio.FLOAT))[..., 0], text_from(file.spec()[KEY])
+    assert text.inverse[0] / depth + text.inverse[1] == pytest.approx(disparity, abs=1e-4), "as the file is read again"
     cameras = cameras_of(source)
     expected = (cameras.range_px[1] - cameras.at_infinity) / (disparity - cameras.at_infinity)
     np.testing.assert_allclose(depth, expected, rtol=1e-5)

@@ -117,6 +117,9 @@ def test_exif_orientation(tmp_path, orientation):
     row, column = edges[row_side], edges[column_side]
     assert np.array_equal(row if column_side in ("left", "top") else row[::-1], RGB[0])
     assert np.array_equal(column if row_side in ("left", "top") else column[::-1], RGB[:, 0])
+    smaller = read_photo(path, max_pixels=60)
+    sizes = open_picture(path).upright_size, smaller.size
+    assert smaller.notes == ("Made smaller by area averaging, from {} to {}.".format(*sizes),)
 
 
 def test_focal_length_from_35_mm_equivalent_or_50_degrees(tmp_path):

@@ -131,14 +131,15 @@ def test_exif_and_xmp_are_kept(tmp_path, source, ending):
     metadata = read_metadata(tmp_path / source)
     saved = tmp_path / f"saved{ending}"
     texts = {SETTINGS_KEY: SETTINGS}
-    write_picture(saved, patches(), metadata=PictureMetadata(metadata.exif, metadata.xmp, texts))
+    upright = np.ascontiguousarray(np.rot90(patches(), -1))
+    write_picture(saved, upright, metadata=PictureMetadata(metadata.exif, metadata.xmp, texts))
     with Image.open(saved) as image:
         exif, xmp = image.getexif(), image.info["xmp"]
         camera = exif.get_ifd(EXIF)
         assert (exif[MAKE], exif.get(ORIENTATION, 1)) == ("Maker", 1)
         assert float(camera[EXPOSURE]) == pytest.approx(1 / 125)
-        assert (camera[FOCAL_35], camera[WIDTH]) == (26, SIDE * len(PATCHES))
-        assert float(camera[PER_UNIT]) == pytest.approx(1000 * SIDE * len(PATCHES) / 4000)
+        assert (camera[FOCAL_35], camera[WIDTH]) == (26, SIDE)
+        assert float(camera[PER_UNIT]) == pytest.approx(1000 * SIDE * len(PATCHES) / 4000), "by the longer sides"
         assert MAKER_NOTE not in camera
         assert not exif.get_ifd(GPS)
         xmp = xmp if isinstance(xmp, str) else xmp.decode()

@@ -51,7 +51,7 @@ def everything(driver):
     brush = replace(driver.app.state.brush, is_on=True, radius=0.2)
     change(do(depth.set_brush, brush), do(depth.paint, (0.4, 0.5)), do(window.end_gesture))
     change(do(depth.set_brush, replace(brush, tool="level")), do(depth.pick, DepthSample((0.5, 0.5), 1.0)))
-    change(do(depth.set_brush, replace(brush, is_on=False)), do(selection.select, (0.5, 0.5)))
+    change(do(depth.set_brush, replace(driver.app.state.brush, is_on=False)), do(selection.select, (0.5, 0.5)))
     change(do(lens.set_depth_strength, 1.5, is_finished=True), do(lens.focus_on, (0.5, 0.5), 0.5))
     change(do(lens.set_gloss, Gloss(roughness=0.5, reflectance=0.5)))
     change(do(lens.set_focus_tilt, (0.3, 0.1)), do(lens.show_tilt_handles, True), do(lens.set_dolly, 0.3))

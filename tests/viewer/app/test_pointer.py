@@ -132,3 +132,10 @@ def test_a_press_on_the_small_picture_moves_the_large_one_and_points_at_nothing(
         assert action.verb is viewpoint.set_zoom
         assert action.args[0].centre == pytest.approx((0.8, 0.3))
     assert actions_from_hover(pointer, ZOOMED, STATE, lambda x, y: 1.5) == []
+
+
+def test_the_divider_follows_the_hand_across_the_seen_part_of_a_zoomed_picture():
+    frame, compared = ZOOMED.frame, inspection.compare(STATE, "photo")
+    x, y = frame.x + 0.5 * frame.width, frame.y + 0.5 * frame.height
+    pointer = Pointer(frame.x + 0.3 * frame.width, y, drag_distance=30, pressed_x=x, pressed_y=y, is_down=True)
+    assert asked(pointer, compared, ZOOMED) == [do(inspection.move_divider, pytest.approx(0.3))]

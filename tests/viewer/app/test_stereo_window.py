@@ -22,6 +22,7 @@ from tests.fake_bridge import PORTRAIT, fake_bridge
 from tests.viewer.conftest import Driver
 from tests.xvfb import display_with_monitors
 from viewer import entry
+from viewer.app.pointer import Pointer
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, messages, preferences, stereo
@@ -127,6 +128,9 @@ def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(vi
         viewer.until(lambda app: app.state.stereo.is_shown and app.window.is_fullscreen)
         viewer.do(do(stereo.set_mode, "anaglyph"), do(messages.dismiss))
         assert viewer.app.state.is_panel_hidden
+        layout, at_pixel = viewer.app.layout(), viewer.app.stereo_screen.pointer
+        finer = at_pixel(Pointer(100, 150, pressed_x=100, pressed_y=150), replace(layout, pixel_ratio=2.0))
+        assert finer == at_pixel(Pointer(200, 300, pressed_x=200, pressed_y=300), layout), "units of two pixels"
         alone = grabbed(display, 0, FIRST)
         viewer.key("Tab", settle=lambda app: not app.state.is_panel_hidden)
         under_panel = grabbed(display, 0, FIRST)

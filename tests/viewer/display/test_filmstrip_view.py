@@ -34,5 +34,11 @@ def test_an_unexpected_error_costs_one_thumbnail_and_a_light_field_shows_a_view(
     assert found[paths[0]] is None
     assert colours_of(gl, found[paths[1]]) == [RED, GREEN]
     assert colours_of(gl, found[paths[2]]) == [GREEN, RED]
+    for first in range(0, 300, 100):  # more than are kept
+        shown = paths[1], *(f"no\0name {number}.jpg" for number in range(first, first + 100))
+        while len(found := strip.thumbnails(shown)) < len(shown):
+            assert paths[1] in found, "as long as it is seen"
+            assert news.wait(60)
+            news.clear()
     strip.release()
     gl.release()

@@ -62,13 +62,15 @@ def test_the_inpainting_overlay_covers_what_the_photo_does_not_show(viewer):
     assert unsure.max() > 128, "viridis: only its light end is red"
 
 
-def test_photo_and_result_on_the_two_sides_of_the_divider(viewer):
-    viewer.do(do(lens.move_eye, ViewOffset(0, 1)))
-    result = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
+@pytest.mark.parametrize("zoom", [None, Zoom(7.0, (0.45, 0.6))])
+def test_photo_and_result_on_the_two_sides_of_the_divider(viewer, zoom):
+    viewer.do(do(viewpoint.set_zoom, zoom), do(lens.move_eye, ViewOffset(0, 1)))
+    seen = layout_for(viewer.state, SIZE, 1.0, 1.0).frame
+    result = part(viewer.screen(SIZE), seen).astype(int)
     viewer.do(do(inspection.compare, "photo"), do(inspection.move_divider, 0.6))
-    compared = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
+    compared = part(viewer.screen(SIZE), seen).astype(int)
     viewer.do(do(inspection.compare, None), do(lens.move_eye, ViewOffset(0, 0)))
-    photo = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
+    photo = part(viewer.screen(SIZE), seen).astype(int)
     divider = round(0.6 * compared.shape[1])
     left, right = np.s_[60:, : divider - 20], np.s_[60:, divider + 20 :]
     assert np.abs(compared[right] - result[right]).max() <= 2
@@ -159,6 +161,9 @@ def test_a_zoomed_picture_has_its_own_values_strips_and_a_frame_on_the_minimap(v
     row = round((26.5 / HEIGHT - seen.y) / seen.height * picture.shape[0])
     near = np.abs(strip[strip.shape[0] // 3 + 3] - picture[row]).max(axis=1)
     assert np.median(near) <= 6, "the strip shows the seen part"
+    strip, column = part(screen, layout.strip_down), round((58.5 / WIDTH - seen.x) / seen.width * picture.shape[1])
+    near = np.abs(strip[:, strip.shape[1] // 3 + 3] - picture[:, column]).max(axis=1)
+    assert np.median(near) <= 6, "that beside the picture too"
     viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
     near = part(viewer.screen(size), layout.frame)[row, :, 0] > 128  # viridis: only its light end is red
     right = (2 / 3 - seen.x) / seen.width
