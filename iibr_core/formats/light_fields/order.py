@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from iibr_core.formats.light_fields.views import step_length
 from iibr_core.types import GridShape, InputError, ViewOffset
 
 if TYPE_CHECKING:
@@ -132,11 +133,14 @@ def as_given(scene: MultiView, given: Arrangement) -> Arrangement:
 
 
 def arranged(scene: MultiView, arrangement: Arrangement) -> MultiView:
-    """Return the scene with its views on the grid of an arrangement, whose order and grid are known."""
+    """Return the scene with its views on the grid of an arrangement, whose order and grid are known.
+
+    Views stay as far apart as they are: the disparity that a file states is that of its own steps.
+    """
     assert arrangement.grid is not None
-    step = arrangement.row_step or 1.0
+    step, across = arrangement.row_step or 1.0, 1.0 if scene.grid is None else step_length(scene) or 1.0
     views = tuple(
-        replace(view, place=place, offset=ViewOffset(place[0] * step, float(place[1])))
+        replace(view, place=place, offset=ViewOffset(place[0] * step * across, place[1] * across))
         for view, place in zip(scene.views, places_in(numbers_of(scene), arrangement))
     )
     layout = scene.layout

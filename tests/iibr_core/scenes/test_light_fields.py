@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,13 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS, open_settled
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, ViewOffset, ViewUpdate
 from tests.iibr_core.depth.multi_view.test_order import HEIGHT, SQUARE_PX, WALL_PX, WIDTH, view_at
 from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
 from tests.viewer.conftest import reduce
@@ -71,6 +73,15 @@ def test_a_field_that_does_not_fit_is_thinned(tmp_path, monkeypatch, is_asked) -
     field, notes = open_settled(source)
     assert (field.grid, field.layout) == (grid, "grid folder, 3x3 of 5x5")
     assert notes[0] == ready.scene.notes[0]
+    stored = [
+        ViewUpdate(v, u, np.zeros((HEIGHT, WIDTH, 3), np.uint8), np.full((HEIGHT, WIDTH), v + u / 8, np.float32))
+        for v, u in np.ndindex(5, 5)
+    ]
+    write_light_field(tmp_path / "known", "hci", GridShape(5, 5), stored, 100.0, "known", True)
+    known = replace(source, path=str(tmp_path / "known"))
+    ((_, views),) = showings(results_of(SceneRequest(1, known, takes_drafts=False), lambda: CENTRE))
+    found = {(result.view.row, result.view.column): result.view.disparity[8, 8] for result in views}
+    assert found == pytest.approx({(v, u): 2 * (2 * v + 2 * u / 8) for v, u in np.ndindex(3, 3)}, abs=0.01)
 
 
 def test_the_centre_views_disparity_may_be_given(tmp_path) -> None:
