@@ -99,7 +99,14 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer, hub):
     viewer.press(GET, "notices", until=lambda app: app.state.models.downloading is not None)
     assert viewer.app.state.prompt is None, "the click was the consent"
     hub.may_finish.set()
-    viewer.settle(is_deep)
+    progress = set()
+
+    def is_done(app):
+        progress.add(app.state.models.downloading)
+        return is_deep(app)
+
+    viewer.settle(is_done)
+    assert all(shown.done <= shown.total for shown in progress - {None}), "megabytes"
     state = viewer.app.state
     assert model_here(MODEL) is not None
     assert wall_slope(viewer) < 0.05, "all of the wall is as dark, and so as far away"
