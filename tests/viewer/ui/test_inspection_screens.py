@@ -161,9 +161,6 @@ def test_a_zoomed_picture_has_its_own_values_strips_and_a_frame_on_the_minimap(v
     row = round((26.5 / HEIGHT - seen.y) / seen.height * picture.shape[0])
     near = np.abs(strip[strip.shape[0] // 3 + 3] - picture[row]).max(axis=1)
     assert np.median(near) <= 6, "the strip shows the seen part"
-    strip, column = part(screen, layout.strip_down), round((58.5 / WIDTH - seen.x) / seen.width * picture.shape[1])
-    near = np.abs(strip[:, strip.shape[1] // 3 + 3] - picture[:, column]).max(axis=1)
-    assert np.median(near) <= 6, "that beside the picture too"
     viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
     near = part(viewer.screen(size), layout.frame)[row, :, 0] > 128  # viridis: only its light end is red
     right = (2 / 3 - seen.x) / seen.width
