@@ -56,6 +56,11 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     assert hole.sum() > 20
     shown = view.colors[::2, ::2][hole]
     assert (np.abs(shown - red.pixels[0, 0]).max(axis=1) < 0.05).mean() > 0.8
+    rays.arrays.colors[rays.photo_images : len(rays)] = np.linspace(0, 59, 60)[:, None]
+    enlarged = large_photo.rays(whole(large_photo.size), [offset], 1.0)
+    *_, column = np.nonzero(added := enlarged.arrays.coverage[enlarged.photo_images : len(enlarged)] > 0)
+    places = enlarged.arrays.colors[enlarged.photo_images : len(enlarged)][added][:, 0]
+    assert np.median(places - ((column + 0.5) / 2 - 0.5)) == pytest.approx(0, abs=0.01), "areas of pixels coincide"
 
 
 def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:

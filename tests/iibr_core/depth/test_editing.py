@@ -133,6 +133,16 @@ def test_a_stroke_does_not_cross_a_contour_and_changes_nothing_outside_the_photo
     np.testing.assert_array_equal(apply_edits(photo, disparity, DepthEdits(strokes=outside)), disparity)
 
 
+@pytest.mark.parametrize("tool", BRUSH_TOOLS)
+def test_a_stroke_is_as_wide_in_a_tall_photo_as_in_a_wide_one(tool) -> None:
+    disparity = np.random.default_rng(0).random((120, WIDTH), np.float32)
+    tall, middle = (
+        apply_edits(np.full((*part.shape, 3), 0.5, np.float32), part, DepthEdits(strokes=(dab(tool, 0.51, 0.5, 0.05),)))
+        for part in (disparity, disparity[40:80])
+    )
+    np.testing.assert_allclose(tall[40:80], middle, atol=1e-3)
+
+
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
 def test_level_and_bucket_paint_the_depth_where_they_begin_or_another_place(tool) -> None:
     photo, disparity = plain_photo(), plane()

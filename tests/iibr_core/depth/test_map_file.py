@@ -233,7 +233,9 @@ def test_a_map_lies_like_the_stored_photo_or_is_turned_itself(tmp_path, orientat
     grey.save(tmp_path / "upright.png")
     grey.transpose(back).save(tmp_path / "stored.png")
     grey.transpose(back).convert("RGB").save(tmp_path / "own_exif.jpg", quality=95, exif=exif)
-    for name in ("upright.png", "stored.png", "own_exif.jpg"):
+    grey.paste(0, (0, 0, 3, 2))
+    grey.transpose(back).save(tmp_path / "zeros.png")
+    for name in ("upright.png", "stored.png", "own_exif.jpg", "zeros.png"):
         choice = DepthChoice(file=str(tmp_path / name), refine=False)
         assert_true_to_scene(open_with_depth(tmp_path / "turned.jpg", choice))
     ramp = np.tile(np.linspace(0, 4, HEIGHT, dtype=np.float32)[:, None], (1, WIDTH))

@@ -68,6 +68,10 @@ def test_a_photo_without_depth_gets_a_guess_or_a_models(iibr, folder, options, i
     assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
     inverse = iibr_core.estimate_depth("photo.png", "red.onnx")
     assert np.median(inverse[-12:]) > np.median(inverse[:12]), "in Python, too"
+    Path("config.json").write_text('{"depth_estimation_type": "metric"}')
+    bright = np.tile(np.linspace(0.6, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3))
+    inverse = iibr_core.estimate_depth(bright, "red.onnx")
+    assert np.median(inverse[-12:]) < np.median(inverse[:12]), "distances are turned into inverse depth"
 
 
 def test_python_and_commands_give_the_same_numbers(iibr, photo_path, folder):
