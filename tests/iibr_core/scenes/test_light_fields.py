@@ -10,7 +10,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
-from iibr_core.formats.light_fields.write import write_light_field
+from iibr_core.formats.light_fields.write import FieldScale, write_light_field
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS, open_settled
@@ -77,9 +77,10 @@ def test_a_field_that_does_not_fit_is_thinned(tmp_path, monkeypatch, is_asked) -
         ViewUpdate(v, u, np.zeros((HEIGHT, WIDTH, 3), np.uint8), np.full((HEIGHT, WIDTH), v + u / 8, np.float32))
         for v, u in np.ndindex(5, 5)
     ]
-    write_light_field(tmp_path / "known", "hci", GridShape(5, 5), stored, 100.0, "known", True)
+    write_light_field(tmp_path / "known", "hci", GridShape(5, 5), stored, 100.0, "known", True, FieldScale(-1.0))
     known = replace(source, path=str(tmp_path / "known"))
-    ((_, views),) = showings(results_of(SceneRequest(1, known, takes_drafts=False), lambda: CENTRE))
+    ((ready, views),) = showings(results_of(SceneRequest(1, known, takes_drafts=False), lambda: CENTRE))
+    assert ready.scene.infinity_px == pytest.approx(-2.0, abs=0.01)
     found = {(result.view.row, result.view.column): result.view.disparity[8, 8] for result in views}
     assert found == pytest.approx({(v, u): 2 * (2 * v + 2 * u / 8) for v, u in np.ndindex(3, 3)}, abs=0.01)
 

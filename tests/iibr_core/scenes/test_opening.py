@@ -87,6 +87,8 @@ def test_progress_counts_every_view_once(photo_path) -> None:
     assert [(now.done, now.total, now.doing) for now in progress] == [(done, 9, "") for done in range(1, 10)]
     assert [(now.share, now.is_complete) for now in progress] == [(done / 9, done == 9) for done in range(1, 10)]
     assert all(view.view.is_final for view in views)
+    (hidden,) = (view.hidden for view in views if view.hidden is not None)
+    assert 0.05 < hidden.colors[hidden.mask].mean() <= hidden.colors.max() < 1.01
     assert 0 < progress[0].seconds <= progress[-1].seconds < 600
     few = list(results_of(request, lambda: CENTRE, lambda: [ViewOffset(1.0, 1.0)]))[1:]
     assert [(view.view.row, view.view.column, view.progress.total) for view in few] == [(1, 1, 2), (2, 2, 2)]
