@@ -21,7 +21,8 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.views import grid_of, read_views
+from iibr_core.formats.light_fields.order import grid_of
+from iibr_core.formats.light_fields.views import read_views
 from iibr_core.types import FloatImage, StoredColors, ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)

@@ -21,7 +21,8 @@ from iibr_core.depth.multi_view.all_views import estimate_all
 from iibr_core.depth.multi_view.estimate import sweep_bytes
 from iibr_core.depth.multi_view.settle import settle
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.views import grid_of, read_views
+from iibr_core.formats.light_fields.order import grid_of
+from iibr_core.formats.light_fields.views import read_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.registry import Inpainter
 from iibr_core.method.light_field import encode_for_storage, nearest_first

@@ -18,7 +18,8 @@ from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views, row_step_of
+from iibr_core.formats.light_fields.order import grid_of
+from iibr_core.formats.light_fields.views import read_stored_view, read_views, row_step_of
 from iibr_core.formats.maps.disparity_file import map_at_size
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.interface.fields import LensViews, LightField, MakeView, View, gather

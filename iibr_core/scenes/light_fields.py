@@ -25,16 +25,14 @@ from iibr_core.formats.light_fields.multi_view_scene import (
     grid_of_every,
     thinned,
 )
-from iibr_core.formats.light_fields.order import UNKNOWN, arranged, as_given, numbers_of
+from iibr_core.formats.light_fields.order import UNKNOWN, arranged, as_given, grid_of, numbers_of, step_length
 from iibr_core.formats.light_fields.pair_files import TWO_FILES
 from iibr_core.formats.light_fields.views import (
     disparity_range,
-    grid_of,
     in_order_of,
     offsets_by_place,
     read_views,
     row_step_of,
-    step_length,
     view_offsets,
 )
 from iibr_core.formats.maps.disparity_file import read_disparity

@@ -12,7 +12,8 @@ from iibr_core.beyond.free_cameras import FreeViews, depths_of, fitted_cameras, 
 from iibr_core.color import photo_in_srgb
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.views import row_step_of, step_length
+from iibr_core.formats.light_fields.order import step_length
+from iibr_core.formats.light_fields.views import row_step_of
 from iibr_core.formats.light_fields.write import FieldScale, note_on_rows
 from iibr_core.formats.outputs import write_folder
 from iibr_core.formats.poses import central_camera, read_poses

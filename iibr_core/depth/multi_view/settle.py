@@ -13,8 +13,17 @@ from iibr_core.depth.multi_view.matching import choose_views, luma_of
 from iibr_core.depth.multi_view.near_side import nearness_ratio
 from iibr_core.depth.multi_view.order_by_parallax import Fit, Verdict, find_order
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given, is_quilt
-from iibr_core.formats.light_fields.views import grid_of, in_order_of, view_offsets
+from iibr_core.formats.light_fields.order import (
+    FLIPS,
+    UNKNOWN,
+    Arrangement,
+    Flip,
+    arranged,
+    as_given,
+    grid_of,
+    is_quilt,
+)
+from iibr_core.formats.light_fields.views import in_order_of, view_offsets
 from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import FloatImage, ViewOffset, ViewUpdate, image_size
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from iibr_core.formats.light_fields.views import step_length
 from iibr_core.types import GridShape, InputError, ViewOffset
 
 if TYPE_CHECKING:
@@ -130,6 +129,35 @@ def as_given(scene: MultiView, given: Arrangement) -> Arrangement:
     """Return the arrangement with the likeliest order and grid where they are not given. Raises InputError as above."""
     first = possible_arrangements(scene, given)[0]
     return replace(given, order=first.order, grid=first.grid)
+
+
+def grid_of(scene: MultiView) -> GridShape:
+    """Return the grid that the views fill."""
+    if scene.grid is None:
+        raise InputError(
+            f"{scene.place}: the views ({scene.layout}) fill no regular grid,"
+            " so they cannot be shown as a light field; only an evaluation reads them"
+        )
+    return scene.grid
+
+
+def indices_of(scene: MultiView) -> dict[GridIndex, int]:
+    """Return the index of the view at each place that has one."""
+    return {view.place: index for index, view in enumerate(scene.views) if view.place is not None}
+
+
+def step_length(scene: MultiView) -> float:
+    """Return the view steps of the scene between neighbouring columns of its grid; between rows if it has one column.
+
+    It exceeds 1 where views were left out, as every second column.
+    """
+    grid, indices = grid_of(scene), indices_of(scene)
+    if len(indices) == 1:
+        return 1.0
+    first = (0, 0) if (0, 0) in indices else (grid.rows // 2, 0)  # a star may have no corners
+    last = (first[0], grid.columns - 1) if grid.columns > 1 else (grid.rows - 1, 0)
+    start, end = (scene.views[indices[at]].offset for at in (first, last))
+    return math.hypot(end.t - start.t, end.s - start.s) / max(last[0] - first[0], last[1])
 
 
 def arranged(scene: MultiView, arrangement: Arrangement) -> MultiView:

@@ -10,6 +10,7 @@ from iibr_core.formats.images.photo import encoded_colors
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView, common_size
+from iibr_core.formats.light_fields.order import grid_of, indices_of, step_length
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import (
     FloatImage,
@@ -27,16 +28,6 @@ EQUAL_STEPS = 0.01
 """Largest share by which the distances of rows and of columns differ that count as equal."""
 
 
-def grid_of(scene: MultiView) -> GridShape:
-    """Return the grid that the views fill."""
-    if scene.grid is None:
-        raise InputError(
-            f"{scene.place}: the views ({scene.layout}) fill no regular grid,"
-            " so they cannot be shown as a light field; only an evaluation reads them"
-        )
-    return scene.grid
-
-
 def read_views(scene: MultiView, wanted: Wanted = lambda: None) -> tuple[ImageSize, Iterator[ViewUpdate]]:
     """Return the size of the views, and an iterator that reads them: the centre first, then the nearest to it.
 
@@ -49,16 +40,16 @@ def read_views(scene: MultiView, wanted: Wanted = lambda: None) -> tuple[ImageSi
 def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
     """Return the colours (H, W, 3) of one view."""
     grid = grid_of(scene)
-    if (row, column) not in _indices(scene):
+    if (row, column) not in indices_of(scene):
         raise InputError(f"{scene.place}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
-    return next(_read_colors(scene, [_indices(scene)[row, column]]))
+    return next(_read_colors(scene, [indices_of(scene)[row, column]]))
 
 
 def disparity_range(scene: MultiView) -> tuple[float, float] | None:
     """Return the least and greatest disparity (px per step of the grid), as stated or of the map nearest to the centre;
     None if neither is known.
     """
-    grid, indices = grid_of(scene), _indices(scene)
+    grid, indices = grid_of(scene), indices_of(scene)
     if scene.range_px is not None:
         low, high = scene.range_px
         return low * step_length(scene), high * step_length(scene)
@@ -67,20 +58,6 @@ def disparity_range(scene: MultiView) -> tuple[float, float] | None:
         return None
     values = _read_map(scene, known, common_size(scene.views[:1]))
     return float(values.min()), float(values.max())
-
-
-def step_length(scene: MultiView) -> float:
-    """Return the view steps of the scene between neighbouring columns of its grid; between rows if it has one column.
-
-    It exceeds 1 where views were left out, as every second column.
-    """
-    grid, indices = grid_of(scene), _indices(scene)
-    if len(indices) == 1:
-        return 1.0
-    first = (0, 0) if (0, 0) in indices else (grid.rows // 2, 0)  # a star may have no corners
-    last = (first[0], grid.columns - 1) if grid.columns > 1 else (grid.rows - 1, 0)
-    start, end = (scene.views[indices[at]].offset for at in (first, last))
-    return math.hypot(end.t - start.t, end.s - start.s) / max(last[0] - first[0], last[1])
 
 
 def view_offsets(scene: MultiView) -> list[ViewOffset]:
@@ -117,12 +94,8 @@ def _nearest_to_centre(grid: GridShape) -> list[GridIndex]:
     return sorted(places, key=lambda at: math.hypot(*grid.offset(*at)))
 
 
-def _indices(scene: MultiView) -> dict[GridIndex, int]:
-    return {view.place: index for index, view in enumerate(scene.views) if view.place is not None}
-
-
 def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize, wanted: Wanted) -> Iterator[ViewUpdate]:
-    indices = _indices(scene)
+    indices = indices_of(scene)
     first, *others = (at for at in _nearest_to_centre(grid) if at in indices)
 
     def places() -> Iterator[GridIndex]:

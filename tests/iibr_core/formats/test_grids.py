@@ -7,8 +7,8 @@ from PIL import Image
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.order import Arrangement
-from iibr_core.formats.light_fields.views import grid_of, read_views, view_offsets
+from iibr_core.formats.light_fields.order import Arrangement, grid_of
+from iibr_core.formats.light_fields.views import read_views, view_offsets
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.scenes.light_fields import find_disparity
