@@ -16,6 +16,7 @@ from math import hypot
 
 import numpy as np
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.all_views import estimate_all
 from iibr_core.depth.multi_view.estimate import sweep_bytes
@@ -33,7 +34,6 @@ from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
 from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
 
-CENTRE = ViewOffset(0.0, 0.0)
 VIEW_BYTES = 60
 """Bytes of a pixel of each given view: its colours, its disparity, and two images of rays."""
 MAX_COMPLETING = 10

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.landed_squares import SAMPLES, draw_rays, project, rows_landed_on
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.inpainting.background import fill_background
 from iibr_core.method.look_up import MIN_SOLE_SHARE, cubic, cubic_on_surface
 from iibr_core.method.rays import RaySet
@@ -22,7 +23,7 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import MAX_PIXELS_AT_ONCE, in_bands
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
-from iibr_core.types import Camera, ImageSize, Margins, ViewOffset
+from iibr_core.types import Camera, ImageSize, Margins
 
 COVERED_SAMPLES = 0.5
 """Share of a pixel's samples that see a surface below which the pixel is a hole."""
@@ -82,9 +83,9 @@ def render_free_view(
     in_bands(band, size, most_pixels=MAX_PIXELS_AT_ONCE // SAMPLES**2)
     if view.occluded.any():
         # Nothing is known to hide what lies behind, so the farthest surface around continues.
-        nothing_hides, here = np.full(size, -np.inf, np.float32), ViewOffset(0.0, 0.0)
+        nothing_hides = np.full(size, -np.inf, np.float32)
         fill_background(
-            view.colors, view.disparity, view.occluded, nothing_hides, here,
+            view.colors, view.disparity, view.occluded, nothing_hides, CENTRE,
             stages=rays.stages, farthest_views=rays.farthest_views,
         )  # fmt: skip
     return view

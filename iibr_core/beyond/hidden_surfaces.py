@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import encoded_from_stored
 from iibr_core.inpainting.background import fill_background
 from iibr_core.method.mixed_pixels import split_mixed_pixels
@@ -76,8 +77,7 @@ def hidden_surface(
         _land(view_colors, view.disparity, mask, *map(float, view.offset), disparity, edge, (background, behind, known))
     open_hole = hole & ~known
     if open_hole.any():
-        here = ViewOffset(0.0, 0.0)
-        fill_background(background, behind, open_hole, disparity, here, threads, farthest_views=lens_radius)
+        fill_background(background, behind, open_hole, disparity, CENTRE, threads, farthest_views=lens_radius)
     return HiddenSurface(background, behind, ~hole | (behind < disparity - STRAY * edge))
 
 

@@ -30,14 +30,14 @@ from viewer.model.app_state import AppState
 from viewer.model.messages import Notice
 from viewer.model.remedies import words_of
 from viewer.model.saving import WRITING, ExportPrompt, SavePrompt
-from viewer.model.tasks import ExportTask, SaveTask
+from viewer.model.tasks import SaveTask
 from viewer.model.viewpoint import clicked_rack
 
 OPEN_PHOTO = "This is the open photo. Choose another name."
 NO_MAP = "a light field has no depth map to save"
 
 
-def add_file(task: SaveTask | ExportTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
+def add_file(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
     """Save the picture or its depth map, or export the scene; show the prompt with the reason if that is not possible,
     or with the question whether to replace the file.
 

@@ -101,7 +101,7 @@ class SideEffects:
                 self._submit(partial(_find_recent, state))
             case tasks.PlainTask("list folder", path):
                 self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
-            case tasks.SaveTask() | tasks.ExportTask():
+            case tasks.SaveTask():
                 return add_file(task, state, self._inputs(state), self._jobs)
             case tasks.CancelJobTask(id_):
                 self._jobs.cancel(id_)

@@ -64,17 +64,9 @@ class ChoosePlaceTask:
 
 @dataclass(frozen=True)
 class SaveTask:
-    """Save the picture or its disparity map."""
+    """Save the picture or its disparity map, or export the scene, as the prompt asks for."""
 
-    prompt: SavePrompt
-    may_replace: bool = False
-
-
-@dataclass(frozen=True)
-class ExportTask:
-    """Export the scene."""
-
-    prompt: ExportPrompt
+    prompt: SavePrompt | ExportPrompt
     may_replace: bool = False
 
 
@@ -101,7 +93,7 @@ class FocusTask:
 
 
 Task = (
-    PlainTask | ChooseTask | TakePathTask | ListTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask
+    PlainTask | ChooseTask | TakePathTask | ListTask | ChoosePlaceTask | SaveTask | CancelJobTask
     | ShowFileTask | FocusTask
 )  # fmt: skip
 

@@ -20,7 +20,7 @@ from tests.viewer.conftest import says, shows, write_scene
 from viewer.model import depth, lens, messages, opening, saving, window
 from viewer.model.action import do
 from viewer.model.saving import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
-from viewer.model.tasks import CancelJobTask, ExportTask, SaveTask, ask
+from viewer.model.tasks import CancelJobTask, SaveTask, ask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
 LARGE = ExportOptions(size=ScreenSize(600, 400), frames=200)
@@ -34,7 +34,7 @@ def viewer(open_window, photo_path):
 
 
 def export(kind, path, options=SMALL, may_replace=False):
-    return do(ask, ExportTask(ExportPrompt(kind, str(path), options), may_replace))
+    return do(ask, SaveTask(ExportPrompt(kind, str(path), options), may_replace))
 
 
 def start(viewer, path, options=SMALL):
@@ -224,12 +224,12 @@ def test_the_prompt_stays_where_a_place_is_impossible_or_taken(viewer, tmp_path)
         wrong = ExportPrompt(kind, str(tmp_path / name))
         app.do(do(messages.show_prompt, None))
         viewer.until_idle()  # an active field keeps its text
-        app.do(do(ask, ExportTask(wrong)))
+        app.do(do(ask, SaveTask(wrong)))
         viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
         assert app.state.prompt == replace(wrong, problem=app.state.prompt.problem or "a reason")
     there.write_text("mine")
     prompt = ExportPrompt("sbs", str(tmp_path / "there.png"), replace(SMALL, frames=0))
-    app.do(do(ask, ExportTask(prompt)))
+    app.do(do(ask, SaveTask(prompt)))
     viewer.until(lambda app: app.state.prompt == replace(prompt, already_there=True))
     assert there.read_text() == "mine"
     viewer.press(f"Replace {there.name}", "prompt ExportPrompt", until=lambda app: bool(viewer.texts()))

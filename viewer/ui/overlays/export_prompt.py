@@ -24,7 +24,6 @@ from viewer.model.action import Action, do
 from viewer.model.app_state import AppState
 from viewer.model.preferences import is_seen_open
 from viewer.model.saving import ExportPrompt
-from viewer.model.tasks import ExportTask
 from viewer.ui.overlays.prompt_rows import WIDTH_FIELD, choice_row, place_actions, place_row, size_row, text_field
 from viewer.ui.widgets import checkbox, choices, gap, label, percent_slider, quiet, scale, slider
 
@@ -91,7 +90,7 @@ def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     written = _written_name(kind, edited, scene)
     if written and written != Path(prompt.path.strip()).name:
         quiet(f"The file name becomes {written}{', for programs that read it.' if kind.path else '.'}")
-    return actions + place_actions(prompt, edited, row_of_path, ExportTask, "Export", state, written)
+    return actions + place_actions(prompt, edited, row_of_path, "Export", state, written)
 
 
 def _kind_rows(kind: str) -> str:

@@ -14,7 +14,7 @@ from viewer.model import messages
 from viewer.model.action import Action, do
 from viewer.model.app_state import AppState, Prompt
 from viewer.model.saving import ExportPrompt, SavePrompt
-from viewer.model.tasks import ChoosePlaceTask, ExportTask, SaveTask, ShowFileTask, ask
+from viewer.model.tasks import ChoosePlaceTask, SaveTask, ShowFileTask, ask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, colored, combo, gap, label, scale
 
@@ -80,34 +80,31 @@ def place_actions(
     prompt: PlacePrompt,
     edited: PlacePrompt,
     row: PlaceRow,
-    task: Callable[[PlacePrompt, bool], SaveTask | ExportTask],
     word: str,
     state: AppState,
     written: str = "",
 ) -> list[Action]:
     """Draw the problem and the buttons of a prompt to save or export; return its actions.
 
-    task: function of the prompt and whether to replace a file that exists. word: on the button that begins it. written:
-    name of the file, if it differs from the typed one.
+    word: on the button that begins it. written: name of the file, if it differs from the typed one.
     """
     edited = replace(edited, path=row.path)
     if edited != prompt:
         edited = replace(edited, already_there=False, problem="")
     if edited.already_there:
-        return _ask_to_replace(edited, row, task, written or PurePath(edited.path.strip()).name, state)
+        return _ask_to_replace(edited, row, written or PurePath(edited.path.strip()).name, state)
     say_problem(edited.problem, state)
     pressed, closed = prompt_buttons(word)
     if row.browses:
         return [do(messages.show_prompt, edited), do(ask, ChoosePlaceTask(edited))]
     if pressed or row.entered:
-        return [do(messages.show_prompt, edited), do(ask, task(edited, False))]
+        return [do(messages.show_prompt, edited), do(ask, SaveTask(edited))]
     return prompt_actions(closed, edited, prompt)
 
 
 def _ask_to_replace(
     prompt: PlacePrompt,
     row: PlaceRow,
-    task: Callable[[PlacePrompt, bool], SaveTask | ExportTask],
     name: str,
     state: AppState,
 ) -> list[Action]:
@@ -119,7 +116,7 @@ def _ask_to_replace(
     cancelled = button("Cancel") or is_enter_free() or row.entered
     imgui.same_line()
     if button(f"Replace {name}"):
-        return [do(ask, task(prompt, True))]
+        return [do(ask, SaveTask(prompt, True))]
     return [do(messages.show_prompt, replace(prompt, already_there=False))] if cancelled else []
 
 

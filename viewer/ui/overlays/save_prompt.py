@@ -16,7 +16,6 @@ from iibr_core.types import SRGB
 from viewer.model.action import Action
 from viewer.model.app_state import AppState
 from viewer.model.saving import SavePrompt
-from viewer.model.tasks import SaveTask
 from viewer.ui.overlays.prompt_rows import place_actions, place_row, size_row
 from viewer.ui.widgets import gap, label, quiet, slider
 
@@ -34,7 +33,7 @@ def save_prompt(prompt: SavePrompt, state: AppState) -> list[Action]:
     if not is_map and state.scene is not None:
         edited = _form_rows(_with_size(prompt, state.scene), state.scene)
     quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
-    return place_actions(prompt, edited, row, SaveTask, "Save", state)
+    return place_actions(prompt, edited, row, "Save", state)
 
 
 def _with_size(prompt: SavePrompt, scene: Scene) -> SavePrompt:
