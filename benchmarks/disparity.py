@@ -23,9 +23,9 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.order import grid_of
 from iibr_core.formats.light_fields.views import read_views
-from iibr_core.types import FloatImage, StoredColors, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, StoredColors, ViewOffset
 
-CENTRE = ViewOffset(0.0, 0.0)
+CENTRE = CENTRE
 HEAD = "light field", "views", "bad pixels (> 0.07 px), %", "square error x 100", "views left out, dB", "processor, s"
 
 

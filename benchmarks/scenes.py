@@ -25,7 +25,7 @@ from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, GridShape, ImageSize, InputError, ViewOffset
 
 MAX_PIXELS = 150_000
 """Largest size of a photo, in pixels."""
@@ -56,7 +56,7 @@ def drawn_scene(
     scene = random_scene(np.random.default_rng(seed), size, largest_px)
     places = [ViewOffset(4.0 * t, 4.0 * s) for t, s in sides]
     truth = {at: render(scene, size, at)[0] for at in places}
-    return Scene(f"drawn {seed}", *render(scene, size, ViewOffset(0.0, 0.0)), truth, offsets_of(GridShape(9, 9)))
+    return Scene(f"drawn {seed}", *render(scene, size, CENTRE), truth, offsets_of(GridShape(9, 9)))
 
 
 def offsets_of(grid: GridShape) -> tuple[ViewOffset, ...]:

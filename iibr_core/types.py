@@ -45,6 +45,8 @@ class ViewOffset(NamedTuple):
     s: float
 
 
+CENTRE = ViewOffset(0.0, 0.0)
+
 Wanted = Callable[[], Collection[ViewOffset] | None]
 """Function that returns the offsets of the views to make or read, None for all views of the grid."""
 

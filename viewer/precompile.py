@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.beyond.free_cameras import FreeViews, inverse_depth_of, steered
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.exports.full_drawing import draw_full
 from iibr_core.exports.full_picture import FullPicture
@@ -35,7 +35,7 @@ from iibr_core.scenes.photo import load_photo, make_plan, prepare_brush
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import Camera
+from iibr_core.types import CENTRE, Camera
 from viewer.model.demo_photo import demo_photo
 
 PART = (slice(150, 310), slice(200, 400))

@@ -16,7 +16,6 @@ from math import hypot
 
 import numpy as np
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.all_views import estimate_all
 from iibr_core.depth.multi_view.estimate import sweep_bytes
@@ -32,7 +31,7 @@ from iibr_core.method.rays import RaySet, rays_of_photo
 from iibr_core.method.view import Renderer, View
 from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import CENTRE, FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
 
 VIEW_BYTES = 60
 """Bytes of a pixel of each given view: its colours, its disparity, and two images of rays."""

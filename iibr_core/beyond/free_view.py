@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.landed_squares import SAMPLES, draw_rays, project, rows_landed_on
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.inpainting.background import fill_background
 from iibr_core.method.look_up import MIN_SOLE_SHARE, cubic, cubic_on_surface
 from iibr_core.method.rays import RaySet
@@ -23,7 +22,7 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import MAX_PIXELS_AT_ONCE, in_bands
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
-from iibr_core.types import Camera, ImageSize, Margins
+from iibr_core.types import CENTRE, Camera, ImageSize, Margins
 
 COVERED_SAMPLES = 0.5
 """Share of a pixel's samples that see a surface below which the pixel is a hole."""

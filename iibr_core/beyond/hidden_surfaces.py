@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import encoded_from_stored
 from iibr_core.inpainting.background import fill_background
 from iibr_core.method.mixed_pixels import split_mixed_pixels
@@ -21,7 +20,7 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.surfaces import EDGE_PX, is_in_front, step_of
-from iibr_core.types import FloatImage, StoredColors, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, StoredColors, ViewOffset
 
 DIAGONAL = math.sqrt(2)
 STRAY = 0.5

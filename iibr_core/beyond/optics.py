@@ -6,9 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from iibr_core.gloss.settings import Gloss
-from iibr_core.types import ViewOffset
+from iibr_core.types import CENTRE, ViewOffset
 
-CENTRE = ViewOffset(0.0, 0.0)
 EXPOSURE_LIMIT_STOPS = 6.0
 RING_INNER_LIMIT = 0.95
 HIGHLIGHT_STOPS = 4.0

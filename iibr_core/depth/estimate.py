@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.types import TOTAL_PARALLAX, FloatImage, GridShape, InputError
 
@@ -38,6 +39,16 @@ class DepthEstimate:
         return self.meaning == "metres"
 
     @property
+    def nearness(self) -> NDArray[np.float64]:
+        """Return the values (H, W), larger is closer: distances as inverse distances. NaN is unknown."""
+        values = self.values.astype(np.float64)
+        if self.is_metric:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                values = np.where(values > 0, 1 / values, np.nan)
+        values[~np.isfinite(values)] = np.nan
+        return values
+
+    @property
     def inverted(self) -> DepthEstimate:
         """Return the estimate with near and far swapped: distances become inverse distances."""
         if self.is_metric:
@@ -60,11 +71,7 @@ def disparity_from(estimate: DepthEstimate, grid: GridShape) -> tuple[FloatImage
     ------
     InputError : nothing is known.
     """
-    values = estimate.values.astype(np.float64)
-    if estimate.is_metric:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            values = np.where(values > 0, 1 / values, np.nan)
-    values[~np.isfinite(values)] = np.nan
+    values = estimate.nearness
     known = values[~np.isnan(values)]
     if not known.size:
         raise InputError("the depth estimate has no known value; give another map")

@@ -11,7 +11,7 @@ import numpy as np
 from iibr_core.beyond.lens import LensSum
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import srgb_from_linear
-from iibr_core.types import FloatImage, ViewOffset, image_size
+from iibr_core.types import CENTRE, FloatImage, ViewOffset, image_size
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class FocalStack:
         """Begin with the given view (H, W, 3), sRGB-encoded."""
         self._foci = foci
         self._sums = [LensSum(Optics(focus_disparity=focus.disparity), image_size(photo)) for focus in foci]
-        self.add(ViewOffset(0.0, 0.0), photo)
+        self.add(CENTRE, photo)
 
     def add(self, offset: ViewOffset, view: FloatImage) -> None:
         """Add a view (H, W, 3), sRGB-encoded, if it lies in the aperture."""

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
@@ -21,7 +20,7 @@ from iibr_core.formats.light_fields.views import offsets_by_place
 from iibr_core.formats.outputs import write_file, write_folder
 from iibr_core.method.memory import require_memory
 from iibr_core.scenes.light_fields import find_range, open_field
-from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import CENTRE, ImageSize, InputError, ViewOffset, ViewUpdate
 
 MAX_POINTS = 20_000
 """Largest number of points for COLMAP, about as many as a reconstruction finds."""

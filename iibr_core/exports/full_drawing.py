@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
 from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import MAX_PIXELS, LensTile, RenderSettings
@@ -24,7 +24,7 @@ from iibr_core.scenes.large_photo import complete_fills, hidden_of_photo, load_l
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, ImageSize, ViewUpdate
+from iibr_core.types import CENTRE, FloatImage, ImageSize, ViewUpdate
 
 TILE_PX = 768
 """Side of a tile in pixels of the photo, without the margin of its views."""

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.cameras import cameras_of, colors_of, nearest_metres
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.outputs import write_file
 from iibr_core.formats.spz import write_spz
 from iibr_core.method.farthest_views import outer_views_of_grid
-from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, GridShape, InputError, ViewOffset
 
 SAME_DISPARITY_PX = 0.1
 """Largest disparity difference, in pixels per view step, of inpainted pixels of several views that become one point."""

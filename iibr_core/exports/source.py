@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from numpy.typing import NDArray
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat
@@ -23,7 +23,7 @@ from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import CENTRE, SRGB, ColorSpace, FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
 
 if TYPE_CHECKING:
     from iibr_core.formats.images.metadata import PictureMetadata

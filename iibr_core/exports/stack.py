@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed
 from iibr_core.exports.kinds import STACK_BITS, ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
@@ -15,7 +15,7 @@ from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_folder
 from iibr_core.scenes.lens_limits import aperture_of_disc
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import InputError
+from iibr_core.types import CENTRE, InputError
 
 OPENED_DISC = 0.03
 """Widest disc as a share of the picture's width, if an open aperture is needed and the window shows a closed one."""

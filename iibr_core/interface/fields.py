@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from iibr_core.beyond.aperture_mask import read_mask
 from iibr_core.beyond.aperture_sampling import aperture_points, views_in_aperture
 from iibr_core.beyond.lens import LensSum
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
 from iibr_core.method.view import View as MadeView
@@ -29,7 +29,7 @@ from iibr_core.runtime.work import (
 from iibr_core.runtime.work import report_progress as report
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Scene, Source
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import CENTRE, FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
 
 CAMERAS_PER_PX = 4.0
 """Views that `LightField.refocus` makes for each pixel of its widest blur."""

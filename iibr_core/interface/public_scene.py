@@ -239,7 +239,7 @@ def estimate_depth(
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> FloatImage:
-    """Return the inverse depth (H, W) float32 of a photo, larger is closer, in no unit, by a model on this machine.
+    """Return the inverse depth (H, W) float32 of a photo by a model on this machine: larger is closer, NaN unknown.
 
     photo: (H, W, 3), or a file. model: a name that `iibr models` lists, an ONNX file, a model's folder, or "guess", for
     height in the picture and contours alone; None: the recommended one. Raises InputError if the model is not here or
@@ -252,8 +252,7 @@ def estimate_depth(
         local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
         assert local is not None, "what was asked for is there, or was refused"
         estimate = local.estimate(given)
-    values = estimate.values
-    return map_at_size(np.reciprocal(values) if estimate.is_metric else values, given.size)
+    return map_at_size(estimate.nearness.astype(np.float32), given.size)
 
 
 def _photo_of(pixels: NDArray[Any], focal_px: float | None = None, name: str = "photo") -> Photo:

@@ -11,6 +11,7 @@ from math import ceil
 import numpy as np
 
 from iibr_core.types import (
+    CENTRE,
     FloatImage,
     GridShape,
     Margins,
@@ -31,7 +32,7 @@ def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
     Together they see all but slivers of what any view in the box disoccludes: the middles of its sides would add
     0.02 dB on exact maps, less on others.
     """
-    every = [ViewOffset(0.0, 0.0), *offsets]
+    every = [CENTRE, *offsets]
     top, bottom = min(at.t for at in every), max(at.t for at in every)
     left, right = min(at.s for at in every), max(at.s for at in every)
     # Opposite corners first: together they disocclude nearly everything, so those after them find little left.
@@ -51,7 +52,7 @@ def farthest_views(outer: Iterable[ViewOffset]) -> float:
 
 def outpainting_margins(disparity: FloatImage, outer: Iterable[ViewOffset]) -> Margins:
     """Return how far beyond the frame of a photo with this disparity (H, W) the outer views see, in pixels."""
-    every = [ViewOffset(0.0, 0.0), *outer]
+    every = [CENTRE, *outer]
     top, bottom = min(at.t for at in every), max(at.t for at in every)
     left, right = min(at.s for at in every), max(at.s for at in every)
     height, width = disparity.shape

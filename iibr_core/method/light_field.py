@@ -26,6 +26,7 @@ from iibr_core.runtime.tiling import THREADS, in_bands, side_by_side
 from iibr_core.runtime.work import Cancelled
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (
+    CENTRE,
     Disparity,
     FloatImage,
     GridShape,
@@ -85,7 +86,7 @@ class ViewMaker:
         self,
         grid: GridShape,
         is_hdr: bool = False,
-        nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+        nearest_to: Callable[[], ViewOffset] = lambda: CENTRE,
         wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
     ) -> Generator[ViewUpdate]:
         """Yield every view of a grid once, in the form of storage: the photo's, the farthest, then those nearest to

@@ -17,6 +17,7 @@ from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, SMOOTH_SHARE, is_in_front, step_of
 from iibr_core.types import (
+    CENTRE,
     FloatImage,
     ImageSize,
     Margins,
@@ -199,7 +200,7 @@ def rays_of_photo(
     largest view offset that will be rendered; it decides which steps of disparity are depth edges.
     """
     colors, disparity = outpaint(colors, disparity, margins, stages)
-    centre, edge_step = ViewOffset(0.0, 0.0), step_of(EDGE_PX, farthest_views)
+    centre, edge_step = CENTRE, step_of(EDGE_PX, farthest_views)
     size = image_size(disparity)
     rays, everywhere = RaySet(2 + more, size, farthest_views, margins, stages), np.ones(size, np.bool_)
     if stages.remove_flying_pixels:

@@ -36,7 +36,7 @@ from iibr_core.scenes.scene import (
     WantedPhoto,
 )
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import InputError, ViewOffset, ViewUpdate, Wanted
+from iibr_core.types import CENTRE, InputError, ViewOffset, ViewUpdate, Wanted
 
 
 def results_of(
@@ -161,7 +161,7 @@ def _count_views(
     time_left, begun_s = TimeLeft(working_clock), time.perf_counter()
     for there, view in enumerate(views, 1):
         chosen = wanted()
-        total = scene.view_count if chosen is None else len({*chosen, ViewOffset(0.0, 0.0)})
+        total = scene.view_count if chosen is None else len({*chosen, CENTRE})
         left_s, seconds = time_left.update(there, total), time.perf_counter() - begun_s
         if view.is_final:
             progress = Progress(there, total, seconds, share=there / total, left_s=left_s)

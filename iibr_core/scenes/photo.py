@@ -30,7 +30,17 @@ from iibr_core.method.view import View
 from iibr_core.runtime.kernels import KERNELS_OF_A_PHOTO, kernel_count
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
-from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    CENTRE,
+    Disparity,
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    Photo,
+    ViewOffset,
+    ViewUpdate,
+)
 
 SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
@@ -152,7 +162,7 @@ def views_of_photo(
     source: Source,
     loaded: LoadedPhoto,
     plan: ScenePlan,
-    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+    nearest_to: Callable[[], ViewOffset] = lambda: CENTRE,
     in_srgb: bool = True,
     wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[ViewUpdate]:

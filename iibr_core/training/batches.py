@@ -27,7 +27,7 @@ from iibr_core.training.losses import color_loss, to_perceptual
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import RaycastScene, cast, render
 from iibr_core.training.trainer import Batch
-from iibr_core.types import FloatImage, ImageSize, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, ImageSize, ViewOffset
 
 SIZE = ImageSize(112, 128)
 VIEWS = 3
@@ -68,7 +68,7 @@ def training_batch(step: int, seed: int) -> Batch:
 
 def _ray_set(scene: RaycastScene, radius: int, rng: np.random.Generator) -> RaySet:
     """Return the rays of the photo with a degraded map, and those that two corner views add."""
-    colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
+    colors, disparity = render(scene, SIZE, CENTRE)
     disparity = degrade(disparity, rng, radius)
     if rng.random() < REFINED_SHARE:
         disparity = refine(colors, disparity)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 from imgui_bundle import imgui
 
-from iibr_core.beyond.optics import CENTRE
-from iibr_core.types import ViewOffset
+from iibr_core.types import CENTRE, ViewOffset
 from viewer.app.pointer import is_marking_gloss
 from viewer.model import depth, inspection, lens, messages, selection, stereo, viewpoint, window
 from viewer.model.action import Action, do

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import typer
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.photo_folder import list_photos
 from iibr_core.formats.outputs import remove_leftovers
 from iibr_core.scenes.scene import source_beside
+from iibr_core.types import CENTRE
 from viewer.app.clipboard import paste_picture
 from viewer.app.dialogs import Dialog, ask_for_path, ask_for_place, has_dialogs, list_folder
 from viewer.app.jobs import Jobs

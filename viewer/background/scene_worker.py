@@ -6,12 +6,12 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.photo_folder import first_photo
 from iibr_core.runtime.compiling import compiled, watch_compiling
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import Progress, SceneReady, SceneRequest, ViewReady
+from iibr_core.types import CENTRE
 from viewer.background.newest import Failed, Post
 
 REPORT_INTERVAL_S = 0.1

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.scenes.scene import Scene, Source
-from iibr_core.types import InputError
+from iibr_core.types import CENTRE, InputError
 from viewer.cli.messages import print_notes, show_progress
 from viewer.cli.view import open_window
 from viewer.model.demo_photo import demo_photo
@@ -65,7 +65,6 @@ def _sheets(scene: Scene, optics: Optics) -> dict[str, tuple[str, list[list[Opti
     """Return the content of each file in words, and the optics of its pictures, row by row."""
     from dataclasses import replace
 
-    from iibr_core.beyond.optics import CENTRE
     from iibr_core.exports.stack import focal_stack
 
     sharp, grid = replace(optics, eye=CENTRE, aperture_diameter=0.0), scene.grid

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import closing
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.scene import MAKING, Scene, SceneReady, SceneRequest, ViewReady
-from iibr_core.types import ViewOffset
+from iibr_core.types import CENTRE, ViewOffset
 from viewer.gpu.refocus.view_sampling import views_seen_by
 
 PicturesOf = Callable[[Scene], Iterable[Optics] | None]

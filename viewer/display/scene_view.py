@@ -11,13 +11,13 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.scenes.scene_gloss import GlossRequest, gloss_request
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, ViewOffset, ViewUpdate
+from iibr_core.types import CENTRE, FloatImage, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot, field_of
 from viewer.gpu.context import GLContext

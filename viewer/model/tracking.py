@@ -14,10 +14,9 @@ import re
 import struct
 from dataclasses import dataclass, replace
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.lens_limits import clamp, clamp_eye, eye_limits
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import CENTRE, InputError, ViewOffset
 from viewer.model.action import Setter, setter
 from viewer.model.app_state import AppState
 from viewer.model.messages import Notice, notify

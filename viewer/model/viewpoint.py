@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.loops import LoopKind, ease, point_on_loop
 from iibr_core.scenes.lens_limits import clamp, clamp_optics
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from viewer.model.action import Setter, setter
 from viewer.model.history import record_edit
 from viewer.model.layout import Zoom

@@ -7,9 +7,9 @@ from scipy.ndimage import map_coordinates
 
 from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights, views_in_aperture
 from iibr_core.beyond.lens import LensSum
-from iibr_core.beyond.optics import CENTRE, ApertureMask, ApertureShape, Optics
+from iibr_core.beyond.optics import ApertureMask, ApertureShape, Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(40, 56)

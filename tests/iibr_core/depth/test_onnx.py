@@ -18,6 +18,7 @@ from iibr_core.depth.models.preparation import USUAL_PREPARATION, read_preparati
 from iibr_core.depth.search import find_depth, open_with_depth
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.images.write import write_image
+from iibr_core.interface.public_scene import estimate_depth
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
 from tests.iibr_core.depth.onnx_graphs import of_channels, of_points, save_graph, weighing
@@ -102,6 +103,7 @@ def test_metric_files_are_known_by_their_settings_or_outputs(tmp_path, extra) ->
     found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), is_metric=True)).disparity
     assert found.unknown[:, :20].all()
     assert not found.unknown[:, -20:].any()
+    np.testing.assert_array_equal(np.isnan(estimate_depth(tmp_path / "photo.png", file)), found.unknown)
     with pytest.raises(InputError, match="gave no distance above 0"):
         values_of(file, Photo(photo_of(60, 90).pixels / 4, 50.0, "dark"))
 

@@ -10,11 +10,9 @@ from iibr_core.evaluation.alignment import ViewFit, Warp
 from iibr_core.evaluation.consistency import consistency, disagreement
 from iibr_core.evaluation.warp import SAMPLES, reference_warp, reference_warp_to
 from iibr_core.method.view import View
-from iibr_core.types import FloatImage, ImageSize, ViewOffset
+from iibr_core.types import CENTRE, FloatImage, ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WALL, WIDTH, disparity_of_square, view_of_square, view_of_wall
 from tests.iibr_core.scenes import smooth_texture
-
-CENTRE = ViewOffset(0.0, 0.0)
 
 
 def slow_splat(disparity: np.ndarray, offset: ViewOffset) -> np.ndarray:

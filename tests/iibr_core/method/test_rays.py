@@ -5,9 +5,9 @@ from iibr_core.method.rays import CELL_PX, GUARD_BAND_PX, RaysBehind, RaySet, ra
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
-from iibr_core.types import ImageSize, Margins, ViewOffset
+from iibr_core.types import CENTRE, ImageSize, Margins, ViewOffset
 
-FARTHEST, CENTRE = 2.0, ViewOffset(0.0, 0.0)
+FARTHEST = 2.0
 SURFACE_STEP = SAME_SURFACE_PX / FARTHEST
 
 

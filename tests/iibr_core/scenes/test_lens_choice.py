@@ -3,13 +3,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
+from iibr_core.beyond.optics import HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.scenes.f_numbers import equivalent_f_number, f_number
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import CENTRE, GridShape, InputError
 
 SCENE = Scene(Source("a.png"), "a", 96, 64, GridShape(5, 9), (-1.0, 2.0), "file", own_size=ScreenSize(960, 640))
 DISPARITY = np.linspace(-1, 2, 64 * 96, dtype=np.float32).reshape(64, 96)

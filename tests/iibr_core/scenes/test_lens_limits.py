@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.lens_limits import (
@@ -25,7 +25,7 @@ from iibr_core.scenes.scene import (
     source_with_depth,
     source_with_map,
 )
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 
 RANGES = [(-1.0, 2.0), (1.0, 4.0), (-3.0, -1.0), (2.0, -1.0), (-1.0, -3.0), (0.0, 2.0), (-2.0, 0.0), (0.0, 0.0)]
 SCENE = Scene(Source("a.png"), "a", 96, 64, GridShape(5, 9), (-1.0, 2.0), "file")

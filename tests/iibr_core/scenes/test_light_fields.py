@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
@@ -16,7 +15,7 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS, open_settled
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import GridShape, ViewOffset, ViewUpdate
+from iibr_core.types import CENTRE, GridShape, ViewOffset, ViewUpdate
 from tests.iibr_core.depth.multi_view.test_order import HEIGHT, SQUARE_PX, WALL_PX, WIDTH, view_at
 from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
 from tests.viewer.conftest import reduce

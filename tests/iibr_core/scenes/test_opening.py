@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import focal_px_from_fov, read_photo
@@ -18,7 +17,7 @@ from iibr_core.scenes.opening import results_of, scene_of_photo, sketch_of
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, photo_of_arrays, sketch_photo
 from iibr_core.scenes.scene import DepthSettings, SceneReady, SceneRequest, Source, ViewReady, WantedPhoto
 from iibr_core.scenes.scene_gloss import add_gloss, gloss_request, make_maps
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import CENTRE, GridShape, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.scenes import square_before_wall
 from tests.viewer.conftest import HEIGHT, WIDTH
 

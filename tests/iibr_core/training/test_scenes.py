@@ -6,9 +6,8 @@ from iibr_core.training.degradation import blur, coarsen, degrade, misalign
 from iibr_core.training.scenes.primitives import BOX, PLANE, PRIMITIVE, WIRE
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import RaycastScene, cast, render
-from iibr_core.types import ImageSize, ViewOffset
+from iibr_core.types import CENTRE, ImageSize, ViewOffset
 
-CENTRE = ViewOffset(0.0, 0.0)
 SIZE = ImageSize(48, 64)
 FOCAL, INFINITY = 70.0, 1.5
 GREATEST_Z = FOCAL / 0.5  # disparity -1

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
+from iibr_core.types import CENTRE
 from viewer.background import tracker
 from viewer.model import tracking
 from viewer.model.action import do

@@ -9,8 +9,8 @@ import glfw
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.beyond.optics import Optics
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, says, shows, write_scene
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE

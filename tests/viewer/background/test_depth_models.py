@@ -3,12 +3,11 @@
 from contextlib import closing
 from threading import Event
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.models import cache
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneRequest, Source
-from iibr_core.types import GridShape
+from iibr_core.types import CENTRE, GridShape
 from tests.iibr_core.depth.onnx_graphs import weighing
 from tests.viewer.conftest import reduce, write_scene
 from viewer.background.depth_models import DepthFinder

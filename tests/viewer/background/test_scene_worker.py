@@ -7,13 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.runtime import compiling
 from iibr_core.scenes.f_numbers import equivalent_f_number
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import ViewOffset, ViewUpdate
+from iibr_core.types import CENTRE, ViewOffset, ViewUpdate
 from tests.iibr_core.scenes.test_light_fields import write_two_planes
 from tests.viewer.conftest import reduce
 from viewer.background.newest import Failed, Newest

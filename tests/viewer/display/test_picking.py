@@ -4,10 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.types import ViewOffset
+from iibr_core.types import CENTRE, ViewOffset
 from viewer.display.picking import LANDING_RADIUS_PX, pick_disparity
-
-CENTRE = ViewOffset(0.0, 0.0)
 
 
 @given(seed=st.integers(0, 99), t=st.floats(-3, 3), s=st.floats(-3, 3), x=st.floats(-40, 55), y=st.floats(-40, 51))

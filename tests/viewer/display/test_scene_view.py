@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.types import CENTRE, GridShape, InputError, ViewOffset
 from tests.viewer.conftest import headless_with_scene, write_scene
 from viewer.display import scene_view
 from viewer.display.offscreen import OffscreenScene

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import iibr_core as iibr
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.scene import Source
-from iibr_core.types import ViewOffset
+from iibr_core.types import CENTRE, ViewOffset
 from tests.iibr_core.unequal_rows import ROW_STEP, SIZE, SQUARE_PX, WALL_PX, seen, write_unequal_rows
 from viewer.cli.main import app
 from viewer.display.offscreen import OffscreenScene

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.hidden_surfaces import HiddenSurface
-from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
+from iibr_core.beyond.optics import HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.color import linear_from_srgb
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from tests.viewer.gpu.scenes import (
     TwoPlanes,
     eyes_of_pixels,

@@ -9,12 +9,11 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.beyond.picture_quality import QUALITY_LEVELS
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, open_field, psnr, rms, settled, through_lens
 
 GRID = GridShape(5, 5)
-CENTRE = ViewOffset(0.0, 0.0)
 SCENE = TwoPlanes()
 GROWTH = 0.004
 """How much a view that arrives may worsen the picture (rms, 1 = white): one more view moves a depth edge by a pixel."""

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.beyond.aperture_sampling import views_in_aperture
-from iibr_core.beyond.optics import CENTRE, ApertureShape
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.beyond.optics import ApertureShape
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from viewer.gpu.refocus import view_sampling
 from viewer.gpu.refocus.view_sampling import pinhole_sources
 

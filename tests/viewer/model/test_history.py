@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.beyond.optics import CENTRE
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import history, lens, opening, window

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.lens_limits import clamp_eye
 from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.types import CENTRE, GridShape, InputError, ViewOffset
 from tests.viewer.model.test_opening import grids, scene_of, state_with
 from viewer.model import history, lens, opening, tracking, viewpoint, window
 from viewer.model.action import do

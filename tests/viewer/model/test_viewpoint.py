@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.loops import LOOPS, point_on_loop
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import history, lens, opening, saving, viewpoint, window

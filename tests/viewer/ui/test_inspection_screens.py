@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import CENTRE, GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, NEAR, WIDTH
 from viewer.display.inspection_view import MASK_COLORS
 from viewer.model import depth, inspection, lens, messages, viewpoint

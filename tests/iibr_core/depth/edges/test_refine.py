@@ -11,10 +11,8 @@ from iibr_core.method.mixed_pixels import split_mixed_pixels
 from iibr_core.training.degradation import blur, coarsen, quantise
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import ImageSize, InputError, ViewOffset
+from iibr_core.types import CENTRE, ImageSize, InputError
 from tests.iibr_core.scenes import smooth_texture
-
-CENTRE = ViewOffset(0.0, 0.0)
 
 
 def disc_before_slope(size: int = 120) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
