@@ -133,7 +133,7 @@ def _depth_of_map(path: Path, found: MapFile, photo: Photo, choice: DepthChoice)
             slope, offset = text.inverse
             with np.errstate(divide="ignore", invalid="ignore"):
                 estimate = DepthEstimate((slope / found.values + offset).astype(np.float32), "disparity")
-        return OrientedDepth(estimate, "the low end", ())
+        return OrientedDepth(estimate, _end_of_values(choice.inverts), ())
     # A scale of -1 only turns integers: their unit stays unknown.
     is_in_px = found.numbers == "floats" or choice.file_scale not in (None, -1)
     is_own = text is not None
@@ -162,4 +162,8 @@ def _disparity(path: Path, numbers: MapNumbers, photo: Photo, choice: DepthChoic
     elif not choice.inverts and evidence < -1:
         words = "near and far look swapped: invert the depth if that is wrong."
         notes += (FixableNote(f"In {path.name} {words}", Remedy.INVERT),)
-    return OrientedDepth(DepthEstimate(scaled, "disparity"), "the high end" if scale > 0 else "the low end", notes)
+    return OrientedDepth(DepthEstimate(scaled, "disparity"), _end_of_values((scale > 0) != choice.inverts), notes)
+
+
+def _end_of_values(is_large_near: bool) -> str:
+    return "the high end" if is_large_near else "the low end"

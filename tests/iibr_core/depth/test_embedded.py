@@ -1,106 +1,38 @@
+"""What parts of photos are no maps, or damaged, or hold more than a map: see test_embedded_photos for whole ones."""
+
+import base64
+import json
 import random
+import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.depth.embedded.apple import heic_estimate
 from iibr_core.depth.embedded.embedded import embedded_in_jpeg, read_embedded
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth
+from iibr_core.formats.images.jpeg_xl import has_depth_channel
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
+from tests.iibr_core.depth.drawn_photo import assert_disparity, assert_metres, drawn, usual_disparity
+from tests.iibr_core.depth.test_embedded_photos import Stored, lytro
 
 SIZE = ImageSize(24, 36)
-RNG = np.random.default_rng(5)
-STORED = RNG.integers(0, 256, SIZE).astype(np.uint8)
-DEEP = RNG.integers(0, 65536, SIZE).astype(np.uint16)
-NEAR, FAR = 2.0, 10.0
+STORED = np.random.default_rng(5).integers(0, 256, SIZE).astype(np.uint8)
+PNG = files.picture(STORED, "PNG")
 
 
-def inverse_of(stored: np.ndarray, kind: str = "RangeInverse", near: float = NEAR, far: float = FAR) -> np.ndarray:
-    """1 / distance, by the formulas of the GDepth specification, one value after the other."""
-    result = np.empty(stored.shape)
-    for place, value in np.ndenumerate(stored):
-        n = value / np.iinfo(stored.dtype).max
-        distance = (far * near) / (far - n * (far - near)) if kind == "RangeInverse" else near + n * (far - near)
-        result[place] = 1 / distance
-    return result
+def opened(tmp_path: Path, name: str, data: bytes) -> PhotoWithDepth:
+    (tmp_path / name).write_bytes(data)
+    return open_with_depth(tmp_path / name)
 
 
-def gdepth(depth: bytes | None = None, **options: object) -> bytes:
-    depth = files.picture(STORED, "PNG") if depth is None else depth
+def gdepth(depth: bytes = PNG, **options: object) -> bytes:
     return files.with_segments(files.grey_photo(SIZE), files.gdepth_segments(depth, **options))
-
-
-def relative(data: bytes) -> np.ndarray:
-    found = embedded_in_jpeg(data)
-    assert found.estimate.meaning == "inverse depth"
-    assert found.estimate.values.dtype == np.float32
-    return found.estimate.values
-
-
-# ---- Google
-
-
-@pytest.mark.parametrize("part_bytes", [None, 100])
-@pytest.mark.parametrize("kind", ["RangeInverse", "RangeLinear"])
-@pytest.mark.parametrize("stored", [STORED, DEEP])
-def test_gdepth_is_read_by_its_formula(stored, kind, part_bytes) -> None:
-    found = relative(gdepth(files.picture(stored, "PNG"), kind=kind, part_bytes=part_bytes))
-    np.testing.assert_allclose(found, inverse_of(stored, kind), rtol=1e-5)
-
-
-@pytest.mark.parametrize(("units", "scale"), [("m", 1.0), ("Meters", 1.0), ("mm", 1e-3), ("furlongs", None)])
-def test_units_tell_metres_from_a_mere_scale(units, scale) -> None:
-    found = embedded_in_jpeg(gdepth(units=units))
-    assert found.estimate.meaning == ("metres" if scale else "inverse depth")
-    if scale:
-        np.testing.assert_allclose(found.estimate.values, scale / inverse_of(STORED), rtol=1e-5)
-
-
-def test_an_inverse_range_may_reach_to_infinity() -> None:
-    np.testing.assert_allclose(relative(gdepth(far="Infinity")), (1 - STORED / 255) / NEAR, atol=1e-6)
-    metric = embedded_in_jpeg(gdepth(far="inf", units="m"))
-    assert np.isfinite(metric.estimate.values).all()
-
-
-def test_unsure_depth_is_unknown() -> None:
-    sure = np.full(SIZE, 200, np.uint8)
-    sure[3:5, 7:9] = 2
-    found = relative(gdepth(confidence=files.picture(sure, "PNG")))
-    assert np.isnan(found[3:5, 7:9]).all()
-    assert np.isnan(found).sum() == 4
-    # A map that is sure of nothing says nothing.
-    assert not np.isnan(relative(gdepth(confidence=files.picture(np.zeros(SIZE, np.uint8), "PNG")))).any()
-
-
-def test_a_lost_part_is_reported() -> None:
-    for lost in (0, 1, -1):
-        standard, *parts = files.gdepth_segments(files.picture(STORED, "PNG"), part_bytes=150)
-        del parts[lost]
-        with pytest.raises(InputError, match="cut short"):
-            embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard, *parts]))
-
-
-@pytest.mark.parametrize("shared_container", [False, True])
-@pytest.mark.parametrize("trailers", [{}, {"between": b"other"}, {"before": files.grey_photo((3, 4)), "behind": b"."}])
-def test_dynamic_depth_is_found_among_trailers(trailers, shared_container) -> None:
-    data = files.dynamic_depth_jpeg(
-        files.grey_photo(SIZE), files.picture(STORED, "PNG"), shared_container=shared_container, **trailers
-    )
-    found = embedded_in_jpeg(data)
-    assert found.estimate.meaning == "metres"
-    assert found.format == "Dynamic Depth"
-    np.testing.assert_allclose(1 / found.estimate.values, inverse_of(STORED), rtol=1e-5)
-
-
-# ---- Apple and Samsung
-
-
-@pytest.mark.parametrize("kind", ["disparity", "depth"])
-def test_a_portrait_saved_as_jpeg(kind) -> None:
-    smooth = np.tile(np.linspace(0, 255, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
-    found = relative(files.apple_jpeg(files.grey_photo(SIZE) + b"padding", smooth, 0.5, 2.5, kind))
-    linear = 0.5 + smooth / 255 * 2.0
-    np.testing.assert_allclose(found, linear if kind == "disparity" else 1 / linear, atol=0.03)
 
 
 @pytest.mark.parametrize(
@@ -118,16 +50,79 @@ def test_the_ranges_of_a_heic(metadata, expected) -> None:
     np.testing.assert_allclose(found.values, [expected], rtol=1e-6)
 
 
-@pytest.mark.parametrize("audio", [False, True])
-def test_samsung_live_focus(audio) -> None:
-    found = relative(files.samsung_jpeg(files.grey_photo(SIZE), STORED, audio=audio))
-    np.testing.assert_allclose(found, 1 - STORED / 255, atol=1e-6)
+def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
+    stored = Stored()
+    picture, gain = Image.fromarray(stored.pixels).convert("L"), files.picture(stored.white)
+    gain = gain[:2] + b"\xff\xe1\x00\x25http://ns.adobe.com/xap/1.0/\0<hdrgm>" + gain[2:]
+    grey, small, matte = np.asarray(picture), np.asarray(picture.resize((120, 80))), np.where(stored.near > 0.6, 255, 0)
+    others = stored.pixels, small, stored.white[:40], np.roll(grey, 12, axis=1), 255 - grey, matte
+    for behind in (gain, *(files.picture(other.astype(np.uint8)) for other in others)):
+        assert embedded_in_jpeg(stored.photo + behind) is None
 
 
-# ---- what is wrong
+JPEG_XL = (
+    "AAAADEpYTCANCocKAAAAFGZ0eXBqeGwgAAAAAGp4bCAAAAAJanhsbAoAAADCanhsY/8KD8EEKrIyODo0CQgIEACgAksoNCa+5nOS"
+    "UFBQUHIBFBSow4BjjFFRKNsY8y4TC0BExRjMO+ReXswYgyl7ARkAgE7EAQIDKAKKRrqQ2DIyEBhzHDAPI+aBAnHEPIRn89LQkAUX"
+    "wgRUa6pq9c7wtls+f588RMsACn3QUhCNodcCZ1CHz1QEXrJoEIk+XbPBVql5J6cQPo5GIHzsXlqqWqzrn1BpwkMQbuPdHJcXtTS3"
+    "Mo0mBpAlN+dCAg=="
+)
+"""A picture of 96x64 pixels with a further channel of depth."""
 
 
-PNG = files.picture(STORED, "PNG")
+def test_a_channel_of_depth_in_jpeg_xl_is_named(tmp_path) -> None:
+    data = base64.b64decode(JPEG_XL)
+    found = opened(tmp_path, "a.jxl", data)
+    assert found.origin.kind == "rough"
+    (note,) = (note for note in found.disparity.notes if "depth channel" in note)
+    assert "a_depth.png" in note
+    codestream = data[data.index(b"\xff\x0a") :]
+    for start, has_depth in ((codestream, True), (codestream[:5], False), (data[:40], False)):
+        (tmp_path / "b.jxl").write_bytes(start)
+        assert has_depth_channel(tmp_path / "b.jxl") is has_depth
+
+
+def test_the_first_frame_of_a_recording(tmp_path) -> None:
+    lzfse = pytest.importorskip("lzfse", reason="the extra record3d is not installed")
+    stored = Stored()
+    stated = {"w": 240, "h": 160, "dw": 120, "dh": 80, "K": [100, 0, 0, 0, 100, 0, 64, 48, 1], "poses": []}
+    metres = (1 / stored.near).astype("<f4")
+    metres[5:9, 50:60] = 0
+    with zipfile.ZipFile(tmp_path / "a.r3d", "w") as archive:
+        archive.writestr("metadata", json.dumps(stated))
+        for number, photo in ((10, files.grey_photo((160, 240))), (2, stored.photo)):
+            archive.writestr(f"rgbd/{number}.jpg", photo)
+            archive.writestr(f"rgbd/{number}.depth", lzfse.compress(metres.tobytes()))
+    found = open_with_depth(tmp_path / "a.r3d")
+    assert_disparity(found, usual_disparity(drawn()[1]))
+    assert_metres(found, drawn()[1])
+    assert found.disparity.unknown.mean() == pytest.approx(40 / metres.size, rel=0.1)
+    assert found.photo.focal_px == pytest.approx(100)
+    assert any("first of its 2 pictures" in note for note in found.photo.notes)
+    (tmp_path / "b.r3d").write_bytes((tmp_path / "a.r3d").read_bytes()[:500])
+    with pytest.raises(InputError, match=r"b\.r3d: is no recording of Record3D, or damaged"):
+        read_photo(tmp_path / "b.r3d")
+
+
+def test_cut_lytro_files_are_to_be_fetched_again_and_unknown_ones_exported(tmp_path) -> None:
+    data = lytro(Stored(), True)
+    (tmp_path / "a.lfp").write_bytes(data)
+    assert photo_size(tmp_path / "a.lfp") == (160, 240)
+    for cut in (0.1, 0.5, 0.95):
+        (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
+        with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: cut off at [^\n]*; get the whole file again$"):
+            read_photo(tmp_path / "a.lfp")
+    entry = {"imageArray": [{"imageRef": "a", "width": 8}]}
+    (tmp_path / "a.lfp").write_bytes(files.lytro_file(entry, {"a": b"x"}))
+    with pytest.raises(InputError, match=r"in an unknown way \(no 'height'\); export it with Lytro Desktop"):
+        read_photo(tmp_path / "a.lfp")
+
+
+def test_a_lost_part_is_reported() -> None:
+    for lost in (0, 1, -1):
+        standard, *parts = files.gdepth_segments(PNG, part_bytes=150)
+        del parts[lost]
+        with pytest.raises(InputError, match="cut short"):
+            embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard, *parts]))
 
 
 @pytest.mark.parametrize(
@@ -153,8 +148,6 @@ def test_entities_are_never_expanded(prolog) -> None:
     with pytest.raises(InputError, match="document type"):
         embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [xmp]))
 
-
-# ---- damaged files
 
 FUZZED = {
     "gdepth.jpg": gdepth(part_bytes=None),

@@ -1,251 +1,281 @@
-import base64
-import json
-import zipfile
-from pathlib import Path
+"""Photos with a map of a drawn scene inside, as each camera and program writes it, are opened and compared with it."""
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image, ImageFilter
 
-from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
-from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.formats.images.jpeg_xl import has_depth_channel
-from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.images.side_by_side import photo_size
-from iibr_core.types import InputError
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.images.write import write_image_file
+from iibr_core.types import GridShape
 from tests.iibr_core import embedded_files as files
+from tests.iibr_core.depth.drawn_photo import (
+    LOSSY,
+    as_bytes,
+    assert_as_kept,
+    assert_disparity,
+    assert_metres,
+    drawn,
+    stored_as,
+    unit,
+    usual_disparity,
+)
+from tests.iibr_core.formats.test_view_files import leia_image, lume_pad_2
 from tests.iibr_core.pictures import with_xmp
 
-PIXELS, DEPTH = files.disc_scene()
-PHOTO = files.picture(PIXELS)
-SMALL = DEPTH[::2, ::2]
-MAP = files.picture(255 - SMALL, "PNG")
+UNREFINED = DepthChoice(refine=False)
 
 
-def opened(tmp_path: Path, name: str, data: bytes) -> PhotoWithDepth:
-    (tmp_path / name).write_bytes(data)
-    return open_with_depth(tmp_path / name)
+class Stored:
+    """The scene as a camera stores it: turned against the orientation that Exif states; the map of half the size."""
+
+    def __init__(self, orientation: int = 1, has_sky: bool = False) -> None:
+        self.orientation = orientation
+        pixels, near = drawn(has_sky)
+        self.pixels, self.near = (stored_as(image, orientation) for image in (pixels, near[::2, ::2]))
+        self.far, self.close = 1 / max(near.min(), 1e-3), 1 / near.max()
+
+    @cached_property
+    def photo(self) -> bytes:
+        return files.picture(self.pixels, orientation=self.orientation)
+
+    @cached_property
+    def blurred(self) -> bytes:
+        soft = Image.fromarray(self.pixels).filter(ImageFilter.GaussianBlur(3))
+        return files.picture(np.asarray(soft), orientation=self.orientation)
+
+    @property
+    def white(self) -> np.ndarray:
+        """The map's bytes, white near."""
+        return as_bytes(unit(self.near))
+
+    @property
+    def black(self) -> np.ndarray:
+        return as_bytes(1 - unit(self.near))
+
+    @property
+    def distances(self) -> np.ndarray:
+        """Shares of the way from the nearest to the farthest distance."""
+        return unit(1 / np.maximum(self.near, 1e-3))
 
 
-def assert_disc_is_nearest(found: PhotoWithDepth) -> None:
-    assert found.origin.kind == "embedded"
-    assert found.disparity.values[60, 60] > found.disparity.values[90, 10] > found.disparity.values[4, 10]
-    assert found.disparity.values[60, 33] > found.disparity.values[60, 94], "not mirrored"
+def png(pixels: np.ndarray) -> bytes:
+    return files.picture(pixels, "PNG")
 
 
-# ---- Google
+def gdepth(s: Stored, stored: np.ndarray | None = None, photo: bytes | None = None, **options: Any) -> bytes:
+    stored = s.black if stored is None else stored
+    options = {"near": s.close, "far": s.far} | options
+    return files.with_segments(photo or s.photo, files.gdepth_segments(png(stored), **options))
 
 
-@pytest.mark.parametrize(
-    ("kind", "near", "far"),
-    [("", 5, 3), ("RangeInverse", 0, 0), ("RangeInverse", -1, 3), ("RangeInverse", "nan", "inf"),
-     ("RangeLinear", 1, "inf"), ("RangeInverse", "", "")],
-)  # fmt: skip
-def test_a_senseless_range_is_told_and_dark_is_near(tmp_path, kind, near, far) -> None:
-    segments = files.gdepth_segments(files.picture(255 - SMALL, "PNG"), kind=kind, near=near, far=far)
-    found = opened(tmp_path, "a.jpg", files.with_segments(PHOTO, segments))
-    assert_disc_is_nearest(found)
-    assert any("makes no sense: only the order" in note for note in found.disparity.notes) is (near != "")
+def confidence(s: Stored) -> bytes:
+    """Nothing is sure in a corner of the box."""
+    sure = np.full(drawn()[1].shape, 90, np.uint8)[::2, ::2]
+    sure[50:60, 70:80] = 3
+    return png(stored_as(sure, s.orientation))
 
 
-@pytest.mark.parametrize("kind", ["PNG", "WEBP", "AVIF"])
-def test_gdepth_in_other_kinds_of_files(tmp_path, kind) -> None:
-    xmp = files.gdepth_segments(files.picture(255 - SMALL, "PNG"))[0].removeprefix(files.STANDARD)
-    assert_disc_is_nearest(opened(tmp_path, f"a.{kind.lower()}", with_xmp(Image.fromarray(PIXELS), kind, xmp)))
+def in_packet(s: Stored, kind: str) -> bytes:
+    packet = files.gdepth_segments(png(s.black), near=s.close, far=s.far)[0].removeprefix(files.STANDARD)
+    return with_xmp(Image.fromarray(s.pixels), kind, packet)
 
 
-# ---- phones' trailers
+def lytro(s: Stored, is_illum: bool) -> bytes:
+    """The disc is sharp in one picture, all else in another."""
+    is_disc = drawn()[1] > 0.9
+    parts = [np.where((is_disc == shown)[..., None], s.pixels, 200).astype(np.uint8) for shown in (False, True)]
+    pictures = {6.0: png(parts[0]), -4.0: png(parts[1])}
+    return files.lytro_stack(pictures, 6 - 10 * unit(drawn()[1]), s.pixels.shape[:2], is_illum)
 
 
-@pytest.mark.parametrize("white_is_near", [True, False])
-@pytest.mark.parametrize(
-    ("orientation", "stored"),
-    [(0, SMALL[:, ::-1]), (0x10, SMALL[::-1]), (0x12, SMALL[:, ::-1]), (0x13, SMALL.T), (0x11, SMALL.T[::-1, ::-1])],
-)
-def test_huawei_maps_lie_as_the_phone_was_held(tmp_path, orientation, stored, white_is_near) -> None:
-    stored = stored if white_is_near else 255 - stored
-    found = opened(tmp_path, "a.jpg", files.huawei_jpeg(PHOTO, stored, orientation))
-    assert_disc_is_nearest(found)
-    assert found.origin.near == ("white" if white_is_near else "black")
-    assert any("counts as near" in note for note in found.disparity.notes)
+def half_sided(s: Stored, axis: int, is_map_first: bool) -> bytes:
+    grey = np.repeat(as_bytes(0.05 + 0.95 * unit(drawn()[1]))[..., None], 3, 2)
+    return files.picture(np.concatenate([grey, s.pixels] if is_map_first else [s.pixels, grey], axis))
 
 
-def blurred_and_sharp() -> tuple[bytes, bytes]:
-    blurred = np.asarray(Image.fromarray(PIXELS).filter(ImageFilter.GaussianBlur(3)))
-    return files.picture(blurred), files.picture(PIXELS)
+def with_list_of_pictures(photo: bytes) -> bytes:
+    return photo[:2] + b"\xff\xe2\0\x0aMPF\0\0\0\0\0" + photo[2:] + photo
 
 
-WITH_SHARP_PICTURE = {
-    "Dynamic Depth": lambda photo, sharp: files.dynamic_depth_jpeg(photo, MAP, original=sharp),
-    "Pixel": lambda photo, sharp: files.dynamic_depth_jpeg(
-        photo, MAP, before=MAP, original=sharp, shared_container=True
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class Row(NamedTuple):
+    """name: of the file. make: its bytes. orientation: of photo and map. metres: 1 / m by the scene's, if it has any.
+
+    options: of `open_with_depth`. atol: in px.
+    """
+
+    name: str
+    make: Callable[[Stored], bytes]
+    orientation: int = 1
+    metres: Callable[[np.ndarray], np.ndarray] | None = None
+    options: Mapping[str, Any] = NOTHING
+    atol: float = LOSSY
+    has_sky: bool = False
+
+
+def guessed(make: Callable[[Stored], bytes], name: str = "a.jpg") -> Row:
+    return Row(name, make, atol=np.inf)
+
+
+def same(near: np.ndarray) -> np.ndarray:
+    return near
+
+
+def of_dynamic_depth(near: np.ndarray) -> np.ndarray:
+    """From 2 to 10 metres."""
+    return 0.1 + 0.4 * unit(near)
+
+
+INVERTED = {"choice": DepthChoice(inverts=True, refine=False)}
+STEREO = {"inv_z_map": {"blob_id": 11}}
+ROWS = {
+    "gdepth, metres": Row("a.jpg", lambda s: gdepth(s, units="m"), 6, same),
+    "gdepth, inverted metres": Row("a.jpg", lambda s: gdepth(s, units="m"), 5, options=INVERTED),
+    "gdepth, linear 16 bits in mm, in parts, seen by 3 rows": Row(
+        "a.jpg",
+        lambda s: gdepth(
+            s, np.rint(65535 * s.distances).astype(np.uint16), kind="RangeLinear", near=1000 * s.close,
+            far=1000 * s.far, units="mm", part_bytes=3000,
+        ),
+        3, same, {"grid": GridShape(3, 1)}, 0.1,
     ),
-    "Samsung": lambda photo, sharp: files.samsung_jpeg(photo, 255 - SMALL, sharp=sharp),
-    "Huawei": lambda photo, sharp: files.huawei_jpeg(photo, SMALL[:, ::-1], sharp=sharp),
-    "Xiaomi": lambda photo, sharp: (
-        photo + sharp + files.picture((SMALL // 2 + np.indices(SMALL.shape)[0] * 2).astype(np.uint8))
+    "gdepth, furlongs": Row("a.jpg", lambda s: gdepth(s, units="furlongs"), 7),
+    "gdepth to infinity": Row("a.jpg", lambda s: gdepth(s, far="Infinity"), 8, options=INVERTED),
+    "gdepth to infinity in metres, sky": Row(
+        "a.jpg", lambda s: gdepth(s, far="inf", units="Meters"), 2, same, has_sky=True
     ),
-    "GDepth": lambda photo, sharp: files.with_segments(photo, files.gdepth_segments(MAP)) + sharp,
-}
+    "gdepth, turned already": Row("a.jpg", lambda s: gdepth(s, Stored().black), 8),
+    "gdepth, squashed": Row(
+        "a.jpg", lambda s: gdepth(s, np.asarray(Image.fromarray(s.black).resize((100, 90)))), 4, atol=0.06
+    ),
+    "gdepth, unsure": Row("a.jpg", lambda s: gdepth(s, confidence=confidence(s)), 6),
+    "gdepth, sure of nothing": Row("a.jpg", lambda s: gdepth(s, confidence=png(0 * s.black)), 1),
+    "gdepth, no format": Row("a.jpg", lambda s: gdepth(s, kind="", near=5, far=3), 1),
+    "gdepth, from 0": Row("a.jpg", lambda s: gdepth(s, near=0, far=0, units="m"), 1),
+    "gdepth, from nan": Row("a.jpg", lambda s: gdepth(s, near="nan", far="inf"), 1),
+    "gdepth, linear to infinity": Row("a.jpg", lambda s: gdepth(s, kind="RangeLinear", near=1, far="inf"), 1),
+    "gdepth, no range": Row("a.jpg", lambda s: gdepth(s, near="", far=""), 1),
+    "gdepth, png": Row("a.png", lambda s: in_packet(s, "PNG")),
+    "gdepth, webp": Row("a.webp", lambda s: in_packet(s, "WEBP")),
+    "gdepth, avif": Row("a.avif", lambda s: in_packet(s, "AVIF")),
+    "gdepth with a sharp picture, small": Row(
+        "a.jpg",
+        lambda s: gdepth(s, photo=s.blurred, sharp=files.picture(s.pixels)),
+        6, options={"max_pixels": 80 * 120},
+    ),
+    "gdepth before a sharp picture": Row("a.jpg", lambda s: gdepth(s, photo=s.blurred) + s.photo, 6),
+    "dynamic depth": Row(
+        "a.jpg", lambda s: files.dynamic_depth_jpeg(s.photo, png(s.black), between=b"other"), 6, of_dynamic_depth
+    ),
+    "dynamic depth after a gain map, before a trailer": Row(
+        "a.jpg",
+        lambda s: files.dynamic_depth_jpeg(s.photo, png(s.black), before=files.grey_photo((3, 4)), behind=b"."),
+        8, of_dynamic_depth,
+    ),
+    "dynamic depth with a sharp picture": Row(
+        "a.jpg",
+        lambda s: files.dynamic_depth_jpeg(s.blurred, png(s.black), original=files.picture(s.pixels)),
+        3, of_dynamic_depth,
+    ),
+    "pixel": Row(
+        "a.jpg",
+        lambda s: files.dynamic_depth_jpeg(
+            s.blurred, png(s.black), before=png(s.white), original=s.photo, shared_container=True
+        ),
+        6, of_dynamic_depth,
+    ),
+    "apple jpeg": Row("a.jpg", lambda s: files.apple_jpeg(s.photo + b"padding", s.white, 0.5, 2.5), 6),
+    "apple jpeg, distances": Row(
+        "a.jpg",
+        lambda s: files.apple_jpeg(s.photo, as_bytes(s.distances), s.close, s.far, "depth"),
+        atol=0.2,
+    ),
+    "apple heic": Row("a.heic", lambda s: files.heic(s.pixels, s.white)),
+    "samsung": Row("a.jpg", lambda s: files.samsung_jpeg(s.photo, s.black, audio=True), 6),
+    "samsung with a sharp picture": Row("a.jpg", lambda s: files.samsung_jpeg(s.blurred, s.black, sharp=s.photo), 8),
+    "samsung heic, turned": Row(
+        "a.heic", lambda s: files.samsung_jpeg(files.heic(s.pixels, orientation=s.orientation), s.black), 6
+    ),
+    "samsung heic, upside down": Row(
+        "a.heic", lambda s: files.samsung_jpeg(files.heic(s.pixels, orientation=s.orientation), s.black), 3
+    ),
+    "samsung heic, turned back": Row(
+        "a.heic", lambda s: files.samsung_jpeg(files.heic(s.pixels, orientation=s.orientation), s.black), 8
+    ),
+    "huawei, first phones": Row("a.jpg", lambda s: files.huawei_jpeg(s.photo, s.white[:, ::-1])),
+    "huawei, black near": Row("a.jpg", lambda s: files.huawei_jpeg(s.photo, s.black[::-1], 0x10)),
+    "huawei, black near, inverted": Row(
+        "a.jpg", lambda s: files.huawei_jpeg(s.photo, s.black[:, ::-1], 0x12), options=INVERTED
+    ),
+    "huawei, held left": Row("a.jpg", lambda s: files.huawei_jpeg(s.photo, s.white.T, 0x13)),
+    "huawei, held right, sharp": Row(
+        "a.jpg", lambda s: files.huawei_jpeg(s.blurred, s.white.T[::-1, ::-1], 0x11, s.photo)
+    ),
+    "xiaomi": Row("a.jpg", lambda s: s.blurred + s.photo + files.picture(s.white)),
+    "a second picture, no sharp one": Row("a.jpg", lambda s: s.photo + s.blurred + files.picture(s.white), 6),
+    "avif": Row("a.avif", lambda s: files.avif(s.pixels, stored_as(as_bytes(unit(drawn()[1])), 6), 6), 6),
+    "avif, black near": Row("a.avif", lambda s: files.avif(s.pixels, as_bytes(1 - unit(drawn()[1])))),
+    "leia": Row("a.lif", lambda s: leia_image(s.pixels, s.pixels, (11, files.picture(s.white)), **STEREO)),
+    "lume pad 2": Row("a.jpg", lambda s: lume_pad_2(s.pixels, s.pixels, (1000002, files.picture(s.white)))),
+    "lytro illum": Row("IMG_0001-stk.lfp", lambda s: lytro(s, True)),
+    "lytro": Row("a.jpg", lambda s: lytro(s, False), options=INVERTED),
+    "beside": Row("photo_rgbd.jpg", lambda s: half_sided(s, 1, False)),
+    "beside, unnamed": Row("IMG_1.png", lambda s: half_sided(s, 1, False), options=INVERTED),
+    "map on the left": Row("left_RGBD.png", lambda s: half_sided(s, 1, True)),
+    "map below": Row("below_rgbd.jpg", lambda s: half_sided(s, 0, False)),
+    "not read: matte of a heic": guessed(
+        lambda s: files.heic(s.pixels, s.white, b"urn:com:apple:photo:2018:aux:portraiteffectsmatte"), "a.heic"
+    ),
+    "not read: matte": guessed(
+        lambda s: files.apple_jpeg(s.photo, s.white, 0, 1, "urn:com:apple:photo:2019:aux:semanticskinmatte")
+    ),
+    "not read: a copy": guessed(lambda s: s.photo + s.photo),
+    "not read: a mask": guessed(lambda s: s.photo + files.picture(np.where(s.near > 0.6, 255, 0).astype(np.uint8))),
+    "not read: another shape": guessed(lambda s: s.photo + files.picture(s.white[:, :60])),
+    "not read: xiaomi": guessed(lambda s: s.photo + b"PMPD\x02\0\x64\0\x01\0" + bytes(100)),
+    "no word: gain map": guessed(
+        lambda s: s.photo + files.with_segments(files.picture(s.white), [files.STANDARD + b"<x hdrgm:Version='1.0'/>"])
+    ),
+    "no word: listed preview": guessed(lambda s: with_list_of_pictures(s.photo)),
+    "no word: other trailer": guessed(lambda s: s.photo + b"some other trailer"),
+    "no word: nothing": guessed(lambda s: s.photo),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", WITH_SHARP_PICTURE)
-def test_the_sharp_picture_of_every_phone_is_shown(tmp_path, kind) -> None:
-    blurred, sharp = blurred_and_sharp()
-    found = opened(tmp_path, "a.jpg", WITH_SHARP_PICTURE[kind](blurred, sharp))
-    assert_disc_is_nearest(found)
-    (tmp_path / "sharp.jpg").write_bytes(sharp)
-    np.testing.assert_allclose(found.photo.pixels, read_photo(tmp_path / "sharp.jpg").pixels, atol=1e-6)
-    assert any("sharp picture" in note for note in found.photo.notes)
-    if kind in ("Huawei", "Xiaomi", "GDepth"):  # the others state which picture is the sharp one
-        found = opened(tmp_path, "a.jpg", WITH_SHARP_PICTURE[kind](sharp, blurred))
-        assert not any("sharp picture" in note for note in found.photo.notes)
+@pytest.mark.parametrize("name", ROWS)
+def test_a_map_inside_is_found_turned_scaled_and_named(tmp_path, regenerate_golden, name) -> None:
+    row = ROWS[name]
+    (tmp_path / row.name).write_bytes(row.make(Stored(row.orientation, row.has_sky)))
+    found = open_with_depth(tmp_path / row.name, **({"choice": UNREFINED} | row.options))
+    pixels, near = drawn(row.has_sky)
+    step = len(pixels) // found.photo.size.height
+    sharp = found.photo.pixels[20:28, 20:28] * 255 - pixels[20:28, 20:28]
+    assert step > 1 or np.abs(sharp).mean() < 4, "the sharp picture"
+    near, grid = near[::step, ::step], row.options.get("grid", GridShape(9, 9))
+    if row.options.get("choice", UNREFINED).inverts:
+        near = 1 / near if "metres" in name else -near
+    assert_disparity(found, usual_disparity(near, grid), row.atol)
+    if row.metres is not None:
+        assert_metres(found, row.metres(near))
+    assert_as_kept(found, tmp_path, "embedded", name, regenerate_golden)
 
 
-def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
-    picture, gain = Image.fromarray(PIXELS).convert("L"), files.picture(DEPTH)
-    gain = gain[:2] + b"\xff\xe1\x00\x25http://ns.adobe.com/xap/1.0/\0<hdrgm>" + gain[2:]
-    grey, small, matte = np.asarray(picture), np.asarray(picture.resize((64, 48))), np.where(DEPTH > 200, 255, 0)
-    others = PIXELS, small, DEPTH[:40], np.roll(grey, 12, axis=1), 255 - grey, matte
-    for behind in (gain, *(files.picture(other.astype(np.uint8)) for other in others)):
-        assert embedded_in_jpeg(PHOTO + behind) is None
-
-
-# ---- AVIF and HEIC
-
-
-@pytest.mark.parametrize("orientation", [1, 6])
-@pytest.mark.parametrize("white_is_near", [True, False])
-def test_the_depth_of_an_avif(tmp_path, orientation, white_is_near) -> None:
-    turns = 1 if orientation == 6 else 0  # stored a quarter turn counter-clockwise
-    depth = DEPTH if white_is_near else 255 - DEPTH
-    data = files.avif(np.rot90(PIXELS, turns), np.rot90(depth, turns), orientation)
-    found = opened(tmp_path, "a.avif", data)
-    assert found.photo.size == (96, 128)
-    assert_disc_is_nearest(found)
-
-
-def test_an_apple_portrait_in_a_heic_and_mattes_that_are_none(tmp_path) -> None:
-    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL))
-    assert_disc_is_nearest(found)
-    assert found.origin.words == "the photo itself (Apple portrait)"
-    kind = b"urn:com:apple:photo:2018:aux:portraiteffectsmatte"
-    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL, auxiliary=kind))
-    assert found.origin.kind == "rough"
-    words = "a.heic holds mattes (portrait effects), which are no depth maps; this is not read."
-    assert words in found.disparity.notes
-
-
-@pytest.mark.parametrize(("orientation", "quarters"), [(1, 0), (3, 2), (6, 1), (8, -1)])
-def test_the_map_of_a_samsung_heic_is_turned_with_its_photo(tmp_path, orientation, quarters) -> None:
-    photo, stored = (np.ascontiguousarray(np.rot90(upright, quarters)) for upright in (PIXELS, 255 - SMALL))
-    data = files.samsung_jpeg(files.heic(photo, orientation=orientation), stored)
-    assert_disc_is_nearest(opened(tmp_path, "a.heic", data))
-
-
-# ---- what is not read
-
-
-def test_what_is_behind_a_photo_and_not_read_is_named(tmp_path) -> None:
-    grey = files.picture(np.asarray(Image.fromarray(PIXELS).convert("L").resize((64, 48))))
-    matte = files.apple_jpeg(b"", SMALL, 0, 1, "urn:com:apple:photo:2019:aux:semanticskinmatte")
-    mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
-    xiaomi = b"PMPD\x02\0\x64\0\x01\0" + bytes(100)
-    for behind, words in (
-        (PHOTO, "a second picture (128x96, colour)"),
-        (grey, "a second picture (64x48, grey)"),
-        (mask, "a second picture (64x48, grey)"),
-        (matte, "mattes (skin), which are no depth maps"),
-        (xiaomi, "a depth map of Xiaomi's kind (PMPD)"),
-    ):
-        found = opened(tmp_path, "a.jpg", PHOTO + behind)
-        assert found.origin.kind == "rough"
-        assert f"a.jpg holds {words}; this is not read." in found.disparity.notes
-
-
-def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path) -> None:
-    path = tmp_path / "a.jpg"
-    gain = files.with_segments(files.picture(SMALL), [files.STANDARD + b"<x hdrgm:Version='1.0'/>"])
-    listed = PHOTO[:2] + b"\xff\xe2\0\x0aMPF\0\0\0\0\0" + PHOTO[2:] + PHOTO
-    for data in (PHOTO, PHOTO + gain, listed, PHOTO + b"some other trailer", b"no photo"):
-        path.write_bytes(data)
-        assert unread_parts(path) == ()
-
-
-JPEG_XL = (
-    "AAAADEpYTCANCocKAAAAFGZ0eXBqeGwgAAAAAGp4bCAAAAAJanhsbAoAAADCanhsY/8KD8EEKrIyODo0CQgIEACgAksoNCa+5nOS"
-    "UFBQUHIBFBSow4BjjFFRKNsY8y4TC0BExRjMO+ReXswYgyl7ARkAgE7EAQIDKAKKRrqQ2DIyEBhzHDAPI+aBAnHEPIRn89LQkAUX"
-    "wgRUa6pq9c7wtls+f588RMsACn3QUhCNodcCZ1CHz1QEXrJoEIk+XbPBVql5J6cQPo5GIHzsXlqqWqzrn1BpwkMQbuPdHJcXtTS3"
-    "Mo0mBpAlN+dCAg=="
-)
-"""A picture of 96x64 pixels with a further channel of depth."""
-
-
-def test_a_channel_of_depth_in_jpeg_xl_is_named(tmp_path) -> None:
-    data = base64.b64decode(JPEG_XL)
-    found = opened(tmp_path, "a.jxl", data)
-    assert found.origin.kind == "rough"
-    (note,) = (note for note in found.disparity.notes if "depth channel" in note)
-    assert "a_depth.png" in note
-    codestream = data[data.index(b"\xff\x0a") :]
-    for start, has_depth in ((codestream, True), (codestream[:5], False), (data[:40], False)):
-        (tmp_path / "b.jxl").write_bytes(start)
-        assert has_depth_channel(tmp_path / "b.jxl") is has_depth
-
-
-# ---- Record3D
-
-
-def test_the_first_frame_of_a_recording(tmp_path) -> None:
-    lzfse = pytest.importorskip("lzfse", reason="the extra record3d is not installed")
-    metres = 1 / (0.1 + SMALL / np.float32(255))
-    stated = {"w": 128, "h": 96, "dw": 64, "dh": 48, "K": [100, 0, 0, 0, 100, 0, 64, 48, 1], "poses": []}
-    with zipfile.ZipFile(tmp_path / "a.r3d", "w") as archive:
-        archive.writestr("metadata", json.dumps(stated))
-        for number, photo in ((10, files.grey_photo((96, 128))), (2, PHOTO)):
-            archive.writestr(f"rgbd/{number}.jpg", photo)
-            archive.writestr(f"rgbd/{number}.depth", lzfse.compress(metres.astype("<f4").tobytes()))
-    found = open_with_depth(tmp_path / "a.r3d")
-    assert_disc_is_nearest(found)
-    assert found.photo.focal_px == pytest.approx(100)
-    slope, offset = found.disparity.inverse_metres
-    assert slope * found.disparity.values[60, 60] + offset == pytest.approx(0.1 + 230 / 255, rel=0.02)
-    assert any("first of its 2 pictures" in note for note in found.photo.notes)
-    (tmp_path / "b.r3d").write_bytes((tmp_path / "a.r3d").read_bytes()[:500])
-    with pytest.raises(InputError, match=r"b\.r3d: is no recording of Record3D, or damaged"):
-        read_photo(tmp_path / "b.r3d")
-
-
-# ---- Lytro
-
-
-def stack(is_illum: bool) -> bytes:
-    """The disc is sharp at lambda -4, all else at 6."""
-    disc, wall = (PIXELS.copy() for _ in range(2))
-    is_disc = DEPTH == 230
-    disc[~is_disc], wall[is_disc] = 200, 200
-    focus = np.where(is_disc, -4.0, 6.0)
-    pictures = {6.0: files.picture(wall, "PNG"), -4.0: files.picture(disc, "PNG")}
-    return files.lytro_stack(pictures, focus, (96, 128), is_illum)
-
-
-@pytest.mark.parametrize("is_illum", [True, False])
-@pytest.mark.parametrize("name", ["IMG_0001-stk.lfp", "a.LFP", "a.jpg"])
-def test_a_processed_lytro_file_opens_with_its_depth(tmp_path, name, is_illum) -> None:
-    found = opened(tmp_path, name, stack(is_illum))
-    assert found.origin.line == "Depth: the photo itself (Lytro)."
-    assert found.disparity.values[60, 60] > found.disparity.values[4, 10]
-    assert photo_size(tmp_path / name) == (96, 128)
-    np.testing.assert_allclose(read_photo(tmp_path / name).pixels * 255, PIXELS, atol=1)
-
-
-def test_cut_lytro_files_are_to_be_fetched_again_and_unknown_ones_exported(tmp_path) -> None:
-    data = stack(True)
-    for cut in (0.1, 0.5, 0.95):
-        (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
-        with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: cut off at [^\n]*; get the whole file again$"):
-            read_photo(tmp_path / "a.lfp")
-    entry = {"imageArray": [{"imageRef": "a", "width": 8}]}
-    (tmp_path / "a.lfp").write_bytes(files.lytro_file(entry, {"a": b"x"}))
-    with pytest.raises(InputError, match=r"in an unknown way \(no 'height'\); export it with Lytro Desktop"):
-        read_photo(tmp_path / "a.lfp")
+@pytest.mark.parametrize("prefixes", [("", ""), ("ViewLayer.Combined.", "ViewLayer.Depth.")])
+def test_the_depth_channel_of_a_rendered_picture(tmp_path, regenerate_golden, prefixes) -> None:
+    photo, near = drawn(has_sky=True)
+    names = (*(prefixes[0] + name for name in "RGBA"), prefixes[1] + "Z")
+    depth = np.where(near > 0, 1 / np.maximum(near, 0.05), 1e10)
+    pixels = np.dstack([photo.astype(np.float32) / 255, np.ones_like(near), depth]).astype(np.float32)
+    write_image_file(tmp_path / "render.exr", pixels, "float", channels=names)
+    found = open_with_depth(tmp_path / "render.exr", UNREFINED)
+    assert_disparity(found, usual_disparity(near))
+    assert_metres(found, near)
+    assert_as_kept(found, tmp_path, "embedded", "depth channel", regenerate_golden)
