@@ -5,8 +5,6 @@ What is found is compared with `tests/golden/exports`; what is known in closed f
 
 import json
 import re
-from collections.abc import Iterator
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,9 +22,8 @@ from iibr_core.formats.poses import read_poses
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.iibr_core import hard_scenes as hard
+from tests.iibr_core import hard_scenes as scenes
 from tests.iibr_core.exports.facts import colors, differences, facts_of
-from viewer.display.offscreen import OffscreenScene
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "exports"
 TILTED = {"aperture": 1.5, "tilt": (0.4, -0.3), "focus_range": 0.2}
@@ -63,11 +60,11 @@ ROWS = [
     Row("field", "spatial-photo", "a.heic", {"focus": -0.4, "aperture": 0.0}, {}, 5),
     Row("photo", "spatial-photo", "b.heic", {}, {"size": ScreenSize(96, 64), "eyes": 2.0}, 5),
     Row("field", "mp4", "a.mp4", {"focus": 0.3, "aperture": 0.5}, {"keys": KEYS, "frames": 6, "rate": 12.0}, 5),
-    Row("photo", "webm", "b.webm", {}, {"motion": "eight", "frames": 4, "rate": 7.5, "size": ScreenSize(64, 32)}, 5),
-    Row("field", "gif", "a.gif", {"aperture": 3.0}, {"motion": "rack", "rack": (2.0, -1.5), "frames": 5, "rate": 8}, 8),
+    Row("photo", "webm", "b.webm", {}, {"motion": "eight", "frames": 8, "rate": 7.5, "size": ScreenSize(64, 32)}, 5),
+    Row("field", "gif", "a.gif", {"aperture": 3.0}, {"motion": "rack", "rack": (2.0, -1.5), "frames": 5}, 8),
     Row("photo", "gif", "b.gif", {}, {"motion": "circle", "frames": 12, "rate": 100.0}, 8),
     Row("field", "webp", "a.webp", {"aperture": 1.0}, {"motion": "focus", "frames": 4, "rate": 9.0}, 5),
-    Row("photo", "webp", "b.webp", {"focus": 0.4}, {"motion": "aperture", "frames": 3, "rate": 240.0}, 5),
+    Row("photo", "webp", "b.webp", {"focus": 0.4}, {"motion": "aperture", "frames": 24, "rate": 240.0}, 5),
     Row("photo", "webp", "c.webp", {}, {"motion": "swing", "frames": 4, "rate": 4.0, "size": ScreenSize(50, 50)}, 5),
     Row("field", "focal-stack", "a", {**TILTED, "eye": ViewOffset(-0.5, 1.0)}, {"frames": 2, "bits": 16}),
     Row("photo", "focal-stack", "b", {"blades": 5, "aperture": 3.0, "highlights": 2.0}, {"frames": 2}),
@@ -102,23 +99,9 @@ ROWS = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def opened(tmp_path_factory) -> Iterator[dict[str, ExportSource]]:
-    """The field and the photo; what does not move of the photo lies between wall and square."""
-    folder = tmp_path_factory.mktemp("hard")
-    given = hard.write_hard_field(folder / "field"), replace(hard.write_hard_photo(folder), focus_disparity=0.24)
-    with ExitStack() as stack:
-        drawers = [stack.enter_context(OffscreenScene()) for _ in given]
-        scenes = [
-            drawer.open_for_export(source, strength, LensChoice(), lambda scene: None)
-            for drawer, source, strength in zip(drawers, given, (1.0, 3.0))
-        ]
-        yield dict(zip(("field", "photo"), scenes))
-
-
-def export(opened: dict[str, ExportSource], row: Row, folder: Path) -> tuple[Path, str | None]:
+def export(hard: dict[str, ExportSource], row: Row, folder: Path) -> tuple[Path, str | None]:
     """Write an export; return its path and what is said of it."""
-    source, options = opened[row.scene], dict(row.options)
+    source, options = hard[row.scene], dict(row.options)
     if "keys" in options:
         (folder / "keys.txt").write_text(options["keys"])
         options["keys"] = folder / "keys.txt"
@@ -129,8 +112,8 @@ def export(opened: dict[str, ExportSource], row: Row, folder: Path) -> tuple[Pat
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.kind}-{row.name}")
-def test_other_programs_find_what_they_found_before(opened, tmp_path, row, regenerate_golden) -> None:
-    path, message = export(opened, row, tmp_path)
+def test_other_programs_find_what_they_found_before(hard, tmp_path, row, regenerate_golden) -> None:
+    path, message = export(hard, row, tmp_path)
     message = message and re.sub(r"[\d.]+ MB", "some MB", message)
     facts = json.loads(json.dumps(facts_of(path) | {"message": message}, default=_plain))
     golden = GOLDEN / f"{row.kind}-{row.name}.json"
@@ -148,30 +131,33 @@ def _plain(value: Any) -> Any:
 
 def seen(row: int, column: int) -> np.ndarray:
     """Return a view of the field as bytes."""
-    return bytes_from_encoded(hard.field_view(row, column))
+    return bytes_from_encoded(scenes.field_view(row, column))
 
 
-def test_pictures_at_views_of_the_field_are_these_views(opened, tmp_path) -> None:
+def test_pictures_at_views_of_the_field_are_these_views(hard, tmp_path) -> None:
     """The right eye stands at the last column, the first tile of a quilt at the bottom left is the first column."""
-    files = {row.name: export(opened, row, tmp_path)[0] for row in ROWS if row.name in ("a.gif", "a.mp4")}
-    found = {kind: export(opened, Row("field", kind, f"{kind}.png"), tmp_path)[0] for kind in PICTURES}
+    files = {row.name: export(hard, row, tmp_path)[0] for row in ROWS if row.name in ("a.gif", "a.mp4")}
+    found = {kind: export(hard, Row("field", kind, f"{kind}.png"), tmp_path)[0] for kind in PICTURES}
     pixels = {kind: np.asarray(Image.open(path).convert("RGB")) for kind, path in found.items()}
     left, right = seen(1, 0), seen(1, 3)
     assert off(pixels["cross-eyed"], np.hstack([right, left])) <= 1
     assert off(pixels["sbs"], np.hstack([left, right])) <= 1
+    in_focus = np.asarray(Image.open(export(hard, FOCUSED, tmp_path)[0]))
+    assert off(in_focus, np.hstack([left[:, 8:], right[:, 2:42]])) <= 1, "the square stays in place"
     assert off(pixels["over-under"], np.vstack([left, right])) <= 1
     assert off(pixels["anaglyph"], dubois(left, right)) <= 2
     assert max(off(pixels["quilt"][-32:, :48], left), off(pixels["quilt"][:32, -48:], right)) <= 1
     assert off(pixels["epi"], np.stack([seen(1, column)[16] for column in range(4)])) <= 1
-    lenslets = np.asarray(Image.open(export(opened, Row("field", "eslf", "a_eslf.png"), tmp_path)[0]))
-    assert all(off(lenslets[v::3, u::4], seen(v, u)) <= 1 for v, u in np.ndindex(*hard.GRID))
-    with np.load(export(opened, Row("field", "npz", "a.npz"), tmp_path)[0]) as arrays:
+    lenslets = np.asarray(Image.open(export(hard, Row("field", "eslf", "a_eslf.png"), tmp_path)[0]))
+    assert all(off(lenslets[v::3, u::4], seen(v, u)) <= 1 for v, u in np.ndindex(*scenes.GRID))
+    with np.load(export(hard, Row("field", "npz", "a.npz"), tmp_path)[0]) as arrays:
         assert off(arrays["views"], np.array([[seen(v, u) for u in range(4)] for v in range(3)])) <= 1
-        assert arrays["disparity"][2, 3][7:19, 26:38] == pytest.approx(hard.NEAR_PX)
+        assert arrays["disparity"][2, 3][7:19, 26:38] == pytest.approx(scenes.NEAR_PX)
     frames = facts_of(files["a.mp4"])["frames"][::2]
     assert not list(differences(frames, [colors(seen(*at)) for at in ((0, 0), (2, 3), (1, 2))], 16))
 
 
+FOCUSED = Row("field", "sbs", "focused.png", {"focus": scenes.NEAR_PX, "aperture": 0.0})
 PICTURES = "cross-eyed", "sbs", "over-under", "anaglyph", "quilt", "epi"
 
 
@@ -189,14 +175,14 @@ def dubois(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     return 255 * srgb_from_linear(np.clip(sum(np.clip(part, 0, 1) for part in parts), 0, 1))
 
 
-def test_cameras_state_the_metres_and_steps_of_the_scenes(opened, tmp_path) -> None:
+def test_cameras_state_the_metres_and_steps_of_the_scenes(hard, tmp_path) -> None:
     """Of the field, views are cropped so that what is infinitely far stays in place; the photo's are moved."""
-    step = (hard.NEAR_PX - hard.INFINITY_PX) / hard.FIELD_FOCAL_PX
+    step = (scenes.NEAR_PX - scenes.INFINITY_PX) / scenes.FIELD_FOCAL_PX
     for kind in ("nerfstudio", "colmap"):
-        folder = export(opened, Row("field", kind, kind), tmp_path)[0]
-        for v, u in np.ndindex(*hard.GRID):
-            t, s = hard.ROW_STEP * (v - 1), u - 2
-            top, left = round(2 - hard.INFINITY_PX * t), round(6 - hard.INFINITY_PX * s)
+        folder = export(hard, Row("field", kind, kind), tmp_path)[0]
+        for v, u in np.ndindex(*scenes.GRID):
+            t, s = scenes.ROW_STEP * (v - 1), u - 2
+            top, left = round(2 - scenes.INFINITY_PX * t), round(6 - scenes.INFINITY_PX * s)
             cropped = np.asarray(Image.open(folder / "images" / f"v{v:02d}_u{u:02d}.png"))
             assert off(cropped, seen(v, u)[top : top + 28, left : left + 36]) <= 1
             camera = read_poses(folder)[4 * v + u]
@@ -205,18 +191,20 @@ def test_cameras_state_the_metres_and_steps_of_the_scenes(opened, tmp_path) -> N
     x, y, z, *rgb = next(line.split()[1:7] for line in points_of(folder) if line.split()[3] == "1")
     column, row = (round(60 * float(at) / float(z) + half - 0.5) for at, half in ((x, 24), (y, 16)))
     assert off(seen(1, 2)[row, column], np.array(rgb, float)) <= 1
-    photo = opened["photo"].scene
+    photo = hard["photo"].scene
     low, high = photo.disparity_range_px
-    step_m = (high - low) / (1 / hard.NEAR_M - 1 / hard.FAR_M) / hard.PHOTO_FOCAL_PX
-    parameters = facts_of(export(opened, Row("photo", "hci", "hci"), tmp_path)[0])["parameters.cfg"]
+    step_m = (high - low) / (1 / scenes.NEAR_M - 1 / scenes.FAR_M) / scenes.PHOTO_FOCAL_PX
+    parameters = facts_of(export(hard, Row("photo", "hci", "hci"), tmp_path)[0])["parameters.cfg"]
     assert parameters["baseline_mm"] == pytest.approx(1000 * step_m)
-    assert parameters["focal_length_mm"] == pytest.approx(hard.PHOTO_FOCAL_PX * 36 / 48)
-    assert high == pytest.approx(step_m * hard.PHOTO_FOCAL_PX * (1 / hard.NEAR_M - 1 / parameters["focus_distance_m"]))
-    folder = export(opened, Row("photo", "nerfstudio", "ns"), tmp_path)[0]
+    assert parameters["focal_length_mm"] == pytest.approx(scenes.PHOTO_FOCAL_PX * 36 / 48)
+    assert high == pytest.approx(
+        step_m * scenes.PHOTO_FOCAL_PX * (1 / scenes.NEAR_M - 1 / parameters["focus_distance_m"])
+    )
+    folder = export(hard, Row("photo", "nerfstudio", "ns"), tmp_path)[0]
     first, second = (camera.position for camera in read_poses(folder)[:2])
-    assert hard.NEAR_M * (second - first) == pytest.approx((step_m, 0, 0)), "one unit is the distance of the nearest"
-    depth = read_pfm(export(opened, Row("photo", "depth", "a.pfm"), tmp_path)[0])
-    assert depth == pytest.approx(hard.flat_map(hard.NEAR_M, hard.FAR_M), rel=1e-4)
+    assert scenes.NEAR_M * (second - first) == pytest.approx((step_m, 0, 0)), "one unit is the distance of the nearest"
+    depth = read_pfm(export(hard, Row("photo", "depth", "a.pfm"), tmp_path)[0])
+    assert depth == pytest.approx(scenes.flat_map(scenes.NEAR_M, scenes.FAR_M), rel=1e-4)
 
 
 def points_of(folder: Path) -> list[str]:

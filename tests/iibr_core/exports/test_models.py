@@ -1,6 +1,5 @@
 """Splats as SPZ, read by the format's description, and textured meshes, read by trimesh."""
 
-import gzip
 import json
 import math
 import struct
@@ -13,10 +12,8 @@ import trimesh
 from PIL import Image
 from plyfile import PlyData
 
-from iibr_core.beyond.optics import Optics
 from iibr_core.exports.cameras import cameras_of, nearest_metres
 from iibr_core.exports.kinds import EXPORTS, ExportOptions
-from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource, open_for_export, write_export
 from iibr_core.exports.triangles import MAX_ERROR_PX, Triangles, triangulate
 from iibr_core.formats.images.color_profile import icc_profile
@@ -24,41 +21,17 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
-from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import DISPLAY_P3, GridShape
-from tests.iibr_core.exports.conftest import exported
-from tests.iibr_core.exports.test_space import with_metres
+from tests.iibr_core.exports.conftest import exported, with_metres
+from tests.iibr_core.exports.readers import SH_BASIS_0, read_spz
 from tests.viewer.conftest import write_scene
 
-SH_BASIS_0 = 0.28209479177387814
 
-
-def read_spz(path: Path) -> dict[str, np.ndarray]:
-    """Places, colours and opacities (0 to 1), radii and quaternions (x, y, z), by version 2 of the format."""
-    content = gzip.decompress(path.read_bytes())
-    magic, version, count, degree, bits, flags, reserved = struct.unpack_from("<4sIIBBBB", content)
-    assert (magic, version, degree, flags, reserved) == (b"NGSP", 2, 0, 0, 0)
-    parts = np.split(np.frombuffer(content, np.uint8, offset=16), np.cumsum([9, 1, 3, 3, 3])[:-1] * count)
-    places, opacities, colors, radii, rotations = (part.reshape(count, -1).astype(np.int32) for part in parts)
-    low, middle, high = places.reshape(count, 3, 3).transpose(2, 0, 1)
-    fixed = (low | middle << 8 | high << 16) - (high >> 7 << 24)
-    return {
-        "places": fixed / 2**bits,
-        "opacities": opacities[:, 0] / 255,
-        "colors": (colors / 255 - 0.5) / 0.15 * SH_BASIS_0 + 0.5,
-        "radii": np.exp(radii / 16 - 10),
-        "rotations": rotations / 127.5 - 1,
-    }
-
-
-@pytest.mark.parametrize(
-    ("nearest", "farthest", "factor"), [(None, None, 1), (1.02, 3.9, 1), (0.5, 400.0, 1), (0.001, 0.004, 10)]
-)
+@pytest.mark.parametrize(("nearest", "farthest", "factor"), [(0.5, 400.0, 1), (0.001, 0.004, 10)])
 def test_splats_as_spz_are_those_of_the_ply_file(source, tmp_path, nearest, farthest, factor) -> None:
-    known = source if nearest is None else with_metres(source, nearest, farthest)
+    known = with_metres(source, nearest, farthest)
     ply = PlyData.read(str(exported(known, "splats", tmp_path / "a.ply")))["vertex"]
-    if nearest is not None:
-        assert (ply["z"].min(), ply["z"].max()) == pytest.approx((nearest, farthest), rel=1e-3), "metres"
+    assert (ply["z"].min(), ply["z"].max()) == pytest.approx((nearest, farthest), rel=1e-3), "metres"
     assert np.exp(ply["scale_0"]) == pytest.approx(0.6 * ply["z"] / cameras_of(known).focal_px, rel=1e-3)
     message = write_export(EXPORTS["splats"], tmp_path / "a.spz", known, ExportOptions())
     assert (message is None) if factor == 1 else (f"{factor} times" in message)
@@ -120,35 +93,8 @@ def test_triangles_follow_a_depth_edge_and_curved_surfaces() -> None:
     assert len(triangles.indices) < 0.7 * disc.size
 
 
-@pytest.fixture(params=[None, (1.02, 3.9)], ids=["relative", "metres"])
-def known(source, request):
-    return source if request.param is None else with_metres(source, *request.param)
-
-
 def meshes_of(path: Path) -> list[trimesh.Trimesh]:
     return trimesh.load_scene(path, process=False).dump()
-
-
-def test_a_mesh_is_the_photo_from_its_place(known, tmp_path) -> None:
-    photo, *behind = meshes_of(exported(known, "mesh", tmp_path / "a.glb"))
-    cameras, metres = cameras_of(known), nearest_metres(known) or 1.0
-    x, y, z = photo.vertices.T
-    assert -z.max() == pytest.approx(metres, rel=1e-4)
-    u, v = photo.visual.uv.T  # trimesh counts v from below
-    np.testing.assert_allclose(0.5 - x / z * cameras.focal_px / 96, u, atol=1e-5)
-    np.testing.assert_allclose(0.5 - y / z * cameras.focal_px / 64, v, atol=1e-5)
-    depths = -z[photo.faces]
-    assert (np.ptp(depths, axis=1) < 0.05 * depths.min()).all(), "cut at the square's edge"
-    texture = np.asarray(photo.visual.material.baseColorTexture.convert("RGB")).astype(int)
-    shown = known.draw(RenderSettings(Optics(), ScreenSize(96, 64)))
-    assert np.abs(texture - shown).mean() < 2
-    assert len(behind) == 5
-    assert len(behind[0].faces) < len(photo.faces) / 2, "the far sides of depth edges alone"
-    for mesh in behind:
-        x, y, z = mesh.vertices.T
-        column, row = np.floor(48 - x / z * cameras.focal_px), np.floor(32 + y / z * cameras.focal_px)
-        inside = (column >= 24) & (column < 72) & (row >= 12) & (row < 52)
-        assert -z[inside].min() > 1.2 * metres, "behind the square"
 
 
 def opened(photo: Path | str, max_pixels: int) -> ExportSource:
