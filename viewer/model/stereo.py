@@ -82,6 +82,8 @@ class Weave:
 
 MAX_PARALLAX = 0.03
 """Largest parallax that eyes bear, as a share of the picture's width."""
+ROUNDING = 1 + 1e-6
+"""Factor by which a parallax may exceed the largest one without a warning."""
 MAX_MARGIN = 0.3
 """Largest share of the width that the shear may crop at each side."""
 BESIDE: tuple[StereoMode, ...] = ("sbs", "half-sbs", "cross-eyed")
@@ -172,7 +174,8 @@ def eye_distance(scene: Scene, stereo: Stereo) -> float:
     with tens of pictures that from the first to the last.
     """
     limit = eye_distance_limit(scene)
-    usual = limit if stereo.display else MAX_PARALLAX / parallax_of_a_view(scene, stereo)
+    cropped = MAX_PARALLAX * abs(screen_plane(scene, stereo)) / scene.width  # the shear's crop enlarges the parallax
+    usual = limit if stereo.display else MAX_PARALLAX / (parallax_of_a_view(scene, stereo) + cropped)
     return clamp(usual if stereo.eyes is None else stereo.eyes, 0.0, limit)
 
 
@@ -197,7 +200,7 @@ def warning(scene: Scene, stereo: Stereo) -> str:
     moved = eye_distance(scene, stereo) / scene.width / eyes_at(scene, Optics(), stereo)[0].part.width
     far, near = ((edge - screen_plane(scene, stereo)) * moved for edge in scene.disparity_range_px)
     worst, place, remedy = max((near, "before", "nearer"), (-far, "behind", "farther"))
-    if worst <= MAX_PARALLAX:
+    if worst <= MAX_PARALLAX * ROUNDING:
         return ""
     words = f"Parallax {place} the screen is {100 * worst:.1f} % of the width, and eyes bear 3 %"
     return f"{words}: reduce the eye distance, or move the screen {remedy}."

@@ -1,26 +1,28 @@
-"""The commands: each name and chord once, each with an action that the state accepts."""
+"""The commands: each name and chord once, what each does to an open photo and when given again, and the palette."""
 
 from dataclasses import replace
-from operator import attrgetter
 
-import pytest
 from imgui_bundle import imgui
 
-from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape
-from tests.viewer.conftest import reduce
-from tests.viewer.model.test_opening import plan_of, scene_of, state_with
-from viewer.model import saving
-from viewer.model.action import do
+from iibr_core.depth.choice import DepthChoice
+from tests.golden_text import assert_same_text
+from tests.viewer.model.picture_stories import EMPTY, OPEN
+from tests.viewer.model.scene_stories import PANEL, PHOTOS, TELEVISION
+from tests.viewer.model.told import EXACT, changes
+from viewer.model import folder
 from viewer.model.app_state import AppState
-from viewer.model.commands import BY_NAME, CAMERA_STEP, COMMANDS, FONT_STEP, Chord, commands_matching
-from viewer.model.demo_photo import demo_photo
+from viewer.model.commands import BY_NAME, COMMANDS, action_for_path, commands_matching
 from viewer.model.inspection import Hover
-from viewer.model.layout import Zoom
-from viewer.model.presets import PRESETS
-from viewer.model.saving import SavePrompt
-from viewer.model.tasks import ChooseTask
-from viewer.model.viewpoint import FreeCamera
+from viewer.model.lens import FIRST_GLOSS
+
+STATE = folder.set_photos(replace(OPEN, hover=Hover(14.5, 9.5, 1.0), monitors=(PANEL, TELEVISION)), "/photos", PHOTOS)
+STATE = replace(STATE, optics=replace(STATE.optics, aperture_diameter=1.0, gloss=FIRST_GLOSS))
+CHOSEN = DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=False)
+CHOSEN = replace(STATE, source=replace(STATE.source, depth=CHOSEN, focus_disparity=1.0))
+CHOICES = (
+    ("photo", "/c.png"), ("folder", "/c"), ("mask", "/m.png"), ("map", "/c.pfm"), ("model", "/x.onnx"),
+    ("model folder", "/x"),
+)  # fmt: skip
 
 
 def test_names_and_chords_are_unique_and_known_to_imgui():
@@ -30,65 +32,30 @@ def test_names_and_chords_are_unique_and_known_to_imgui():
     assert all(hasattr(imgui.Key, chord.key) for chord in chords)
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
-@pytest.mark.parametrize("state", [AppState(), state_with(scene_of())], ids=["empty", "open"])
-def test_every_command_can_be_given_at_any_time(command, state):
-    assert isinstance(reduce(state, command.action(state)), AppState)
+def given(state, action):
+    """Return the state after an action, and what it changed."""
+    after = action.apply(state)
+    assert isinstance(after, AppState)
+    return after, [f"    {line}" for line in changes(state, after)]
 
 
-OPEN = replace(state_with(scene_of(plan=plan_of(GridShape(9, 9)))), hover=Hover(14.5, 9.5, 1.0))
+def test_each_command_does_what_its_name_says_and_again(regenerate_golden):
+    lines = []
+    for command in COMMANDS:
+        words = ", ".join(chord.words for chord in command.chords)
+        once, changed = given(STATE, command.action(STATE))
+        lines += [f"{command.name} [{words}]{' repeats' * command.repeats}", *changed]
+        lines += ["  again", *given(once, command.action(once))[1], "  with nothing open"]
+        lines += given(EMPTY, command.action(EMPTY))[1]
+    for what, path in CHOICES:
+        for state in (STATE, CHOSEN, EMPTY):
+            lines += [f"{what} {path}", *given(state, action_for_path(what, path, state))[1]]
+    assert_same_text(lines, "viewer/stories", "commands", regenerate_golden, *EXACT)
 
 
-@pytest.mark.parametrize(
-    ("name", "part", "value"),
-    [
-        ("Step forward", "free_camera", FreeCamera(forward=CAMERA_STEP)),
-        ("Step back", "free_camera", FreeCamera(forward=-CAMERA_STEP)),
-        ("Look up", "free_camera", FreeCamera(down=-CAMERA_STEP)),
-        ("Look down", "free_camera", FreeCamera(down=CAMERA_STEP)),
-        ("Look left", "free_camera", FreeCamera(right=-CAMERA_STEP)),
-        ("Look right", "free_camera", FreeCamera(right=CAMERA_STEP)),
-        ("Larger text", "preferences.font_scale", FONT_STEP),
-        ("Smaller text", "preferences.font_scale", 1 / FONT_STEP),
-        ("Invert depth", "depth.edits.is_inverted", True),
-        ("Preset: macro", "optics.focus_disparity", 3.0),
-        ("Motion: figure of eight", "motion.kind", "eight"),
-        ("Depth brush: smooth", "brush.tool", "smooth"),
-        ("Select a subject", "brush.tool", "select"),
-        ("Overlay: inpainting", "inspection.overlay", "inpainted"),
-        ("Compare with the photo", "inspection.comparison", "photo"),
-        ("Before and after", "shows_before", True),
-        ("Light or dark", "preferences.theme", "light"),
-        ("Units: a photographer's or a light field's", "preferences.units", "light field"),
-        ("Stereo display: cross-eyed", "preferences.stereo_mode", "cross-eyed"),
-        ("Zoom: the photo's own pixels, 1:1", "zoom", Zoom(1.0, (0.25, 0.25))),
-    ],
-)
-def test_commands_do_what_their_names_say(name, part, value):
-    assert attrgetter(part)(reduce(OPEN, BY_NAME[name].action(OPEN))) == value
-
-
-def test_chords_in_words_and_what_commands_bring_up():
-    assert Chord("z", ctrl=True, shift=True).words == "Ctrl+Shift+Z"
-    assert [c.chords[0].words for c in COMMANDS if "text" in c.name.lower()] == ["Ctrl++", "Ctrl+−", "Ctrl+0"]
-    state = state_with(scene_of())
-    asked = reduce(state, BY_NAME["Save the picture…"].action(state))
-    assert asked.prompt == SavePrompt("photo-iibr.png", (60, 40))
-    helped = reduce(state, BY_NAME["Mouse and keys"].action(state))
-    assert (helped.prompt, reduce(helped, BY_NAME["Mouse and keys"].action(helped)).prompt) == ("help", None)
-    assert reduce(state, BY_NAME["Open a photo…"].action(state)).tasks == (ChooseTask("photo"),)
-
-
-def test_the_palette_finds_by_parts_of_words():
-    assert [c.name for c in commands_matching("preset")] == [f"Preset: {name}" for name in PRESETS]
-    assert [c.name for c in commands_matching("AGAIN larger")] == []
-    assert [c.name for c in commands_matching("TEXT lar")] == ["Larger text"]
+def test_the_palette_finds_by_parts_of_words(regenerate_golden):
+    recent = (replace(BY_NAME["Quit"], name="Open depth.png"),)
+    found = {text: commands_matching(text, recent) for text in ("PRESET", "again larger", "TEXT lar", "de", "o dep")}
+    lines = [f"{text}: {', '.join(command.name for command in commands)}" for text, commands in found.items()]
+    assert_same_text(lines, "viewer/stories", "palette", regenerate_golden, *EXACT)
     assert commands_matching("") == COMMANDS
-
-
-@pytest.mark.parametrize("path", ["/home/a/.cache/iibr/clipboard/pasted/photo.png", str(demo_photo())])
-def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path):
-    """A cache that is emptied, the demo's in the installation."""
-    state = state_with(replace(scene_of(source=Source(path)), name="photo"))
-    saved, exported = (reduce(state, action).prompt for action in (do(saving.ask_to_save), do(saving.ask_to_export)))
-    assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-web.html")

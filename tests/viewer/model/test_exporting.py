@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportOptions
-from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
@@ -22,7 +21,6 @@ from viewer.model.saving import (
     usual_export_path,
     written_path,
 )
-from viewer.model.selection import Selection
 
 STATE = state_with(replace(scene_of(source=Source("/photos/bike.jpg")), name="bike"))
 PLAIN = ExportOptions()
@@ -35,17 +33,11 @@ def test_every_kind_has_its_purpose_and_every_purpose_a_kind_that_can_be_made_an
     assert (first_kind("display"), first_kind("software")) == ("quilt", "focal-stack")
 
 
-def test_the_folder_of_the_last_is_proposed_again():
+def test_names_say_what_is_in_them():
     assert usual_export_path(STATE, "gif") == "/photos/bike-iibr.gif"
     assert usual_export_path(STATE, "anaglyph") == "/photos/bike-anaglyph.png"
     assert usual_export_path(STATE, "hci") == "/photos/bike-hci"
     assert usual_export_path(STATE, "eslf") == "/photos/bike_eslf.png"
-    plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
-    photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
-    later = saving.begin_job(photo, Path("/shared/before.png"))
-    exported, saved, mapped = saving.ask_to_export(later), saving.ask_to_save(later), saving.ask_to_save(later, "map")
-    assert Path(exported.prompt.path).parent == Path(saved.prompt.path).parent == Path("/shared")
-    assert Path(mapped.prompt.path).parent == Path("/photos"), "there it is found again"
 
 
 def test_another_kind_keeps_the_name_that_was_typed():
@@ -94,13 +86,3 @@ def test_files_that_were_written_or_failed_are_listed_the_latest_first():
     assert len(state.files) == MAX_FILES
     assert state.files[0].problem == state.notices[-1].text == "the disk is full"
     assert state.notices[-2].text == "Exported /a/13.gif"
-
-
-def test_a_matte_is_of_the_selected_surface_or_of_the_one_put_in_focus():
-    """In pixels of the photo, which may be larger than its views."""
-    scene = replace(STATE.scene, own_size=ScreenSize(400, 300))
-    state = replace(STATE, scene=scene)
-    assert saving.picked_place(state) is None
-    focused = replace(state, focused_at=(0.5, -1.0))
-    assert saving.picked_place(focused) == (300, 0)
-    assert saving.picked_place(replace(focused, selection=Selection((0.25, 0.5)))) == (100, 150)

@@ -1,6 +1,5 @@
 """The stereo picture: viewpoints of the eyes, parallax on the screen, arrangements, and the choice of a monitor."""
 
-import json
 from dataclasses import replace
 
 import pytest
@@ -8,11 +7,9 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.lenticular import parse_calibration
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import stereo
 from viewer.model.app_state import AppState
 from viewer.model.stereo import STEREO_MODES, Monitor, Stereo
@@ -52,8 +49,8 @@ def test_all_eyes_stay_within_the_views_and_the_picture(at, count):
 def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of():
     usual = Stereo()
     assert stereo.eye_distance(SCENE, usual) == pytest.approx(0.03 * 600 / 4)
-    assert stereo.eye_distance(SCENE, replace(usual, screen=4.0)) == pytest.approx(0.03 * 600 / 6)
-    assert stereo.warning(SCENE, usual) == ""
+    assert stereo.eye_distance(SCENE, replace(usual, screen=4.0)) == pytest.approx(0.03 * 600 / (6 + 0.03 * 4))
+    assert [stereo.warning(SCENE, replace(usual, screen=plane)) for plane in (-2.0, 0.0, 1.0, 4.0)] == [""] * 4
     wide = replace(usual, eyes=8.0)
     assert stereo.warning(SCENE, wide).startswith("Parallax before the screen is 5.3 % of the width")  # 4 * 8 / 600
     behind = stereo.warning(SCENE, replace(wide, screen=4.0))  # 6 * 8 / 600, of the width that the shear leaves
@@ -74,65 +71,3 @@ def test_pictures_fit_their_rooms_and_places_lead_back(mode, size):
     middle = stereo.place_in_photo(weave, weave.frame_px.width / 2, weave.frame_px.height / 2)
     assert middle == pytest.approx((0.5, 0.5), abs=0.51 / min(weave.eyes[0].size_px))
     assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0), abs=1e-9)
-
-
-def test_the_picture_goes_to_the_chosen_monitor_else_to_the_second_else_to_the_window():
-    assert stereo.show(STATE, True).stereo.monitor == TELEVISION
-    alone = stereo.show(replace(STATE, monitors=(PANEL,), hides_panel=False), True)
-    assert alone.stereo.is_shown
-    assert (alone.stereo.fills_window, alone.is_panel_hidden) == (True, True)
-    closed = stereo.show(alone, False)
-    assert (closed.stereo.is_shown, closed.stereo.fills_window, closed.is_panel_hidden) == (False, False, False)
-    moved = stereo.choose_monitor(stereo.show(STATE, True), PANEL)
-    assert moved.stereo.fills_window
-    assert not stereo.choose_monitor(moved, TELEVISION).stereo.fills_window
-    third = Monitor("DP-2", 5760, 0, 640, 480)
-    chosen = stereo.choose_monitor(replace(STATE, monitors=(PANEL, TELEVISION, third)), third)
-    assert not chosen.stereo.is_shown
-    assert stereo.show(chosen, True).stereo.monitor == third
-    assert stereo.show(replace(chosen, monitors=STATE.monitors), True).stereo.monitor == TELEVISION
-    assert stereo.show(replace(STATE, monitors=()), True).stereo.monitor is None
-
-
-def test_a_monitor_that_moves_is_followed_and_one_that_goes_closes_the_picture():
-    shown, moved = stereo.show(STATE, True), replace(TELEVISION, x=1024)
-    assert stereo.set_monitors(shown, (PANEL, moved)).stereo.monitor == moved
-    gone = stereo.set_monitors(shown, (PANEL,))
-    assert not gone.stereo.is_shown
-    assert "HDMI-1" in gone.notices[-1].text
-
-
-def test_the_command_and_escape_close_it():
-    shown, closed = stereo.show(STATE, True), stereo.show(stereo.show(STATE, True), False)
-    for keys in (Keys(is_escape=True), Keys(commands=("Stereo display",))):
-        (action,) = actions_from_keys(keys, shown)
-        assert action.apply(shown) == closed
-
-
-def lenticular(width, height):
-    """The calibration of a display with a screen of this size."""
-    stated = {"pitch": 50, "slope": -7, "center": 0.5, "DPI": 300, "screenW": width, "screenH": height}
-    return parse_calibration(json.dumps(stated), "a display")
-
-
-def test_a_lenticular_display_gets_all_views_on_its_own_monitor():
-    display, twin = lenticular(1440, 2560), Monitor("DP-3", 9000, 0, 1440, 2560)
-    state = replace(STATE, monitors=(*STATE.monitors, replace(twin, name="DP-2", x=5760), twin))
-    assert stereo.show_on(state, display).stereo.monitor == state.monitors[2], "the first of its size"
-    shown = stereo.show_on(state, display, (9000, 0))
-    assert shown.stereo.monitor == twin
-    weave = stereo.weave_of(shown, SCENE, ScreenSize(1440, 2560))
-    assert len(weave.eyes) == 66
-    assert (weave.eyes[0].optics.eye.s, weave.eyes[-1].optics.eye.s) == (-4.0, 4.0)
-    assert weave.eyes[0].size_px == (372, 256), "three to two on a tile that is displayed as 9 to 16"
-    assert stereo.place_in_photo(weave, 720, 1280) == pytest.approx((0.5, 0.5), abs=0.01)
-    assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0))
-    assert stereo.warning(SCENE, shown.stereo) == ""
-    assert stereo.set_mode(shown, "rows").stereo.display is None
-
-
-def test_a_monitor_of_another_size_is_named():
-    shown = stereo.show_on(STATE, lenticular(1536, 2048))
-    assert shown.stereo.monitor == TELEVISION
-    assert "screen of 1536x2048, not of HDMI-1, 3840 x 2160" in stereo.warning(SCENE, shown.stereo)
-    assert stereo.eye_distance(SCENE, replace(shown.stereo, eyes=1.0)) == 1.0

@@ -2,23 +2,17 @@
 
 import math
 import struct
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.lens_limits import clamp_eye
-from iibr_core.scenes.scene import Source
-from iibr_core.types import CENTRE, GridShape, InputError, ViewOffset
+from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_opening import grids, scene_of, state_with
-from viewer.model import history, lens, opening, tracking, viewpoint, window
-from viewer.model.action import do
-from viewer.model.app_state import AppState
+from viewer.model import tracking
 from viewer.model.tracking import HEAD_RANGE_LIMITS, address_of, eye_of, head_in, offset_of, smooth
-from viewer.model.viewpoint import FreeCamera
 
 FIVE = scene_of(GridShape(5, 5))
 
@@ -122,70 +116,6 @@ def test_the_filter_starts_again_after_a_pause_and_takes_packets_of_one_moment()
     assert smooth(first, 5j, 9.0) == first
     assert smooth(first, 5j, 11.0).place == 5j
     assert 1 < smooth(first, 5j, 10.1).place.imag < 5
-
-
-# The hand
-
-
-def test_the_first_place_of_the_head_is_the_centre():
-    assert tracked(0j).tracking.latency_ms == 5.0
-    state = replace(tracking.switch(state_with(FIVE), "udp"), optics=replace(AppState().optics, eye=ViewOffset(1, -1)))
-    assert followed(state, 40 - 9j).optics.eye == pytest.approx((1, -1))
-    assert followed(state, 40 - 9j, 55 - 9j).optics.eye.s > 0
-
-
-def test_a_drag_moves_the_centre_and_the_head_goes_on_from_there():
-    state = lens.move_eye(tracked(0j, 6 + 0j), ViewOffset(1, -1))
-    state = followed(state, 6 + 0j)
-    assert state.optics.eye == pytest.approx((1, -1))
-    assert followed(state, 7 + 0j).optics.eye.s > -1
-    assert followed(state, 30 + 0j, 6 + 0j).optics.eye == pytest.approx((1, -1))
-
-
-def test_home_makes_the_present_place_the_centre():
-    state = viewpoint.return_home(tracked(0j, 6 + 3j))
-    for i in range(12):
-        state = followed(viewpoint.tick(state, i / 20), 6 + 3j)
-    assert not state.motion.is_running
-    assert state.optics.eye == pytest.approx(CENTRE)
-    assert state.tracking.centre == pytest.approx(6 + 3j)
-
-
-def test_undo_of_a_focus_does_not_move_the_centre():
-    state = lens.set_focus(window.end_gesture(tracked(0j, 3 + 0j)), 0.5)
-    state = followed(history.undo(followed(state, 9 + 0j)), 9 + 0j)
-    assert state.optics.focus_disparity == 0
-    assert state.optics.eye == tracked(0j, 9 + 0j).optics.eye
-
-
-def test_another_photo_keeps_the_centre():
-    state = followed(lens.move_eye(tracked(0j, 3 + 0j), CENTRE), 9 + 0j)
-    opened = opening.open_source(state, Source("other.png"))
-    shown = opening.show_scene(opened, opened.generation, scene_of(GridShape(5, 5), opened.source))
-    assert shown.optics.eye == CENTRE
-    assert followed(shown, 9 + 0j).optics.eye == state.optics.eye != CENTRE
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"stroke": Stroke("nearer", ((0.5, 0.5),), 0.1, 1.0)},
-        {"free_camera": FreeCamera(0.1)},
-        {"scene": None},
-    ],
-)
-def test_the_viewpoint_holds_while_something_else_needs_it(changes):
-    state = tracked(0j, 3 + 0j)
-    held = followed(replace(state, **changes), 9 + 0j)
-    assert held.optics == state.optics
-    again = followed(replace(held, **{name: getattr(state, name) for name in changes}), 9 + 0j)
-    assert again.optics.eye == tracked(0j, 9 + 0j).optics.eye
-
-
-def test_a_state_without_a_tracker_ignores_the_head():
-    state = state_with(FIVE)
-    actions = [do(tracking.follow, 3 + 0j, 1.0), do(tracking.set_receiving, True)]
-    assert [action.apply(state) for action in actions] == [state, state]
 
 
 @pytest.mark.parametrize(
