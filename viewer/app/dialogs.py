@@ -12,7 +12,7 @@ from typing import Any
 from imgui_bundle import portable_file_dialogs as dialogs
 
 from iibr_core.exports.kinds import export_kind
-from iibr_core.exports.photo_folder import in_order, list_photos
+from iibr_core.exports.photo_folder import FolderPhoto, in_order, list_photos
 from viewer.model.browsing import Listing
 from viewer.model.saving import ExportPrompt, SavePrompt
 from viewer.model.tasks import ChoiceOf
@@ -82,8 +82,9 @@ def list_folder(what: ChoiceOf, typed: str, path: str) -> Listing:
 
     typed: the folder as the user typed it. path: the same, absolute.
     """
-    photos = in_order(list_photos(path), "name") if what in ("photo", "folder") else None
-    folders, files = [], []
+    photos = list(list_photos(path)) if what in ("photo", "folder") else None
+    folders: list[str] = []
+    files: list[FolderPhoto] = []
     with suppress(OSError), os.scandir(path) as entries:
         for entry in entries:
             if entry.name.startswith("."):
@@ -91,9 +92,9 @@ def list_folder(what: ChoiceOf, typed: str, path: str) -> Listing:
             if entry.is_dir():
                 folders.append(entry.name)
             elif photos is None and entry.name.lower().endswith(tuple(f".{end}" for end in CHOICES[what][1].split())):
-                files.append(entry.name)
-    shown = files if photos is None else [photo.name for photo in photos]
-    return Listing(typed, path, tuple(sorted(folders, key=str.casefold)), tuple(shown))
+                files.append(FolderPhoto(entry.name))
+    shown = in_order(files if photos is None else photos, "name")
+    return Listing(typed, path, tuple(sorted(folders, key=str.casefold)), tuple(each.name for each in shown))
 
 
 def ask_for_place(prompt: SavePrompt | ExportPrompt) -> Dialog:

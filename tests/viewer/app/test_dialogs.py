@@ -8,7 +8,7 @@ import pytest
 from imgui_bundle import portable_file_dialogs
 
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.app.dialogs import ask_for_path, ask_for_place, list_folder
+from viewer.app.dialogs import ask_for_path, ask_for_place
 from viewer.model.saving import ExportPrompt, SavePrompt
 
 
@@ -35,18 +35,6 @@ def test_a_place_is_asked_for_with_the_typed_name(asked):
     assert ask_for_place(ExportPrompt("hci", "photos/field")).name == "field"
     assert asked[0][:2] == ("Save the picture", os.path.join(os.getcwd(), "photos", "one-iibr.png"))
     assert asked[1][1] == os.path.join(os.getcwd(), "photos")
-
-
-def test_a_folder_shows_what_can_be_opened_in_natural_order(tmp_path):
-    for name in ("IMG_10.jpg", "IMG_9.JPG", "IMG_9_depth.png", ".hidden.jpg", "notes.txt", "net.onnx"):
-        (tmp_path / name).touch()
-    for name in ("b", "A", ".git"):
-        (tmp_path / name).mkdir()
-    photos = list_folder("photo", "~/", str(tmp_path))
-    assert (photos.folders, photos.files) == (("A", "b"), ("IMG_9.JPG", "IMG_10.jpg")), "maps belong to their photos"
-    assert list_folder("model", "~/", str(tmp_path)).files == ("net.onnx",)
-    assert "IMG_9_depth.png" in list_folder("map", "~/", str(tmp_path)).files
-    assert list_folder("photo", "", str(tmp_path / "gone")).folders == ()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems show their dialog without a program")

@@ -89,18 +89,6 @@ def test_stopping_keeps_the_views_that_are_there(open_window, photo_path):
     assert "stopped at" in driver.app.state.progress.doing
 
 
-def test_the_panel_says_how_the_photo_was_taken(open_window, tmp_path):
-    from PIL import Image
-
-    exif = Image.Exif()
-    exif[0x010F] = "Maker"
-    exif.get_ifd(0x8769).update({0x829A: 1 / 60, 0x8827: 200})
-    Image.fromarray(np.full((48, 64, 3), 90, np.uint8)).save(tmp_path / "a.jpg", exif=exif)
-    driver = open_window(tmp_path / "a.jpg", grid=GridShape(1, 1))
-    driver.until(lambda app: app.state.facts is not None)
-    assert driver.app.state.facts.facts == (("Camera", "Maker"), ("Exposure", "1/60 s, ISO 200"))
-
-
 def test_about_opens_the_page_of_releases_only_when_that_is_asked_for(viewer, monkeypatch):
     opened = []
     pages = {"Releases": "https://example.org/releases", "Documentation": "https://example.org/docs"}
