@@ -28,6 +28,8 @@ FILTERING = Tolerance(2, 0.0, 3)
 """The same with texture filtering of 8-bit values in between."""
 SAME_RASTERISER = Tolerance(2, 0.002, 24)
 """Golden images: another version of the software rasteriser may decide a depth edge differently here and there."""
+DECISIONS = Tolerance(2, 0.002, 255)
+"""Golden maps: another processor may give a pixel here and there to the other side of an edge."""
 
 
 def problem_with(image: NDArray[np.uint8], expected: NDArray[np.uint8], tolerance: Tolerance) -> str | None:

@@ -81,6 +81,12 @@ def confidence(s: Stored) -> bytes:
     return png(stored_as(sure, s.orientation))
 
 
+def points(stored: np.ndarray) -> bytes:
+    sure = np.zeros_like(stored)
+    sure[::5, ::5] = 255
+    return png(sure)
+
+
 def in_packet(s: Stored, kind: str) -> bytes:
     packet = files.gdepth_segments(png(s.black), near=s.close, far=s.far)[0].removeprefix(files.STANDARD)
     return with_xmp(Image.fromarray(s.pixels), kind, packet)
@@ -157,6 +163,7 @@ ROWS = {
         "a.jpg", lambda s: gdepth(s, np.asarray(Image.fromarray(s.black).resize((100, 90)))), 4, atol=0.06
     ),
     "gdepth, unsure": Row("a.jpg", lambda s: gdepth(s, confidence=confidence(s)), 6),
+    "gdepth, hardly sure": Row("a.jpg", lambda s: gdepth(s, confidence=points(s.black)), 6, atol=np.inf),
     "gdepth, sure of nothing": Row("a.jpg", lambda s: gdepth(s, confidence=png(0 * s.black)), 1),
     "gdepth, no format": Row("a.jpg", lambda s: gdepth(s, kind="", near=5, far=3), 1),
     "gdepth, from 0": Row("a.jpg", lambda s: gdepth(s, near=0, far=0, units="m"), 1),

@@ -7,7 +7,6 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.formats.images.picture import upright
 from iibr_core.remedies import Remedy, remedy_of
 from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
@@ -139,32 +138,6 @@ def test_a_model_is_used_and_named(tmp_path) -> None:
     assert found.origin.failures == ()
     assert open_with_depth(photo_file(tmp_path), choice).origin.kind == "embedded"  # its own depth comes first
     assert open_with_depth(photo_file(tmp_path), replace(choice, start="model")).origin.kind == "model"
-
-
-@pytest.mark.parametrize(
-    ("orientation", "is_turned_already"), [(n, False) for n in range(1, 9)] + [(n, True) for n in range(5, 9)]
-)
-def test_depth_is_turned_with_the_photo(orientation, is_turned_already, tmp_path) -> None:
-    """Some writers turn the map already; that shows in its shape only where the sides are swapped."""
-    depth = np.full(SIZE, 200, np.uint8)
-    depth[:10, :14] = 20
-    stored = upright(depth, orientation) if is_turned_already else depth
-    found = open_with_depth(photo_file(tmp_path, stored, orientation), start_from("auto"))
-    values = found.disparity.values
-    expected = upright(depth, orientation) < 100
-    assert values.shape == found.photo.size == expected.shape
-    assert values[expected].min() > values[~expected].max()
-
-
-def test_unknown_depth_is_filled_with_a_note(tmp_path) -> None:
-    sure = np.zeros(SIZE, np.uint8)
-    sure[::5, ::5] = 255
-    found = open_with_depth(photo_file(tmp_path, confidence=files.picture(sure, "PNG")), start_from("auto"))
-    assert np.isfinite(found.disparity.values).all()
-    assert found.disparity.values[20:28, 32:40].min() > found.disparity.values[:6].max()
-    (note,) = found.disparity.notes
-    assert "Only 4.3 % of its depth is known" in note
-    assert "filled" in note
 
 
 def test_the_sharp_picture_is_shown(tmp_path) -> None:
