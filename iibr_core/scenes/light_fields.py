@@ -104,7 +104,7 @@ def load_light_field(
         return
     if found is not None and found.values.shape == size:
         scene = replace(scene, arrangement=found.arrangement, notes=found.notes)
-        yield _with_disparity(scene, chain((centre,), views), _offsets_from(field, centre), found.values, wanted)
+        yield _with_disparity(scene, chain((centre,), views), offsets_by_place(field), found.values, wanted)
         return
     read: list[ViewUpdate] = []
     if takes_drafts:
@@ -119,14 +119,7 @@ def load_light_field(
     origin = scene.depth_source if given is None else Path(map_file).name if map_file else FROM_VIEWS
     values = centre.disparity if given is None else given
     assert values is not None
-    yield _with_disparity(scene, read, _offsets_from(field, centre), values, wanted, origin)
-
-
-def _offsets_from(field: MultiView, centre: ViewUpdate) -> dict[GridIndex, ViewOffset]:
-    """Return the viewpoints of the views from one of them, in steps of the grid."""
-    offsets = offsets_by_place(field)
-    t, s = offsets[centre.row, centre.column]
-    return {place: ViewOffset(at.t - t, at.s - s) for place, at in offsets.items()}
+    yield _with_disparity(scene, read, offsets_by_place(field), values, wanted, origin)
 
 
 def open_field(source: Source) -> MultiView:

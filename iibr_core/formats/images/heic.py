@@ -24,7 +24,10 @@ def read_heic(path: Path, number: int = 0) -> Picture:
     alpha = opaque_as_none(pixels[..., 3]) if pixels.shape[2] == 4 else None
     is_premultiplied = bool(getattr(picture, "premultiplied_alpha", False))
     colors = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
-    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, image_size(pixels)))
+    # Exif states the size that the camera stored, before the picture is turned.
+    is_turned = orientation_in(exif_of(picture.info.get("exif"))) >= 5
+    stored = ImageSize(*pixels.shape[1::-1]) if is_turned else image_size(pixels)
+    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, stored))
 
 
 def heic_size(path: Path, number: int = 0) -> ImageSize:

@@ -19,7 +19,7 @@ from iibr_core.formats.images.file_notes import file_notes, tile_note
 from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import CUT_OFF, Picture, full_scale, upright
-from iibr_core.formats.images.picture_source import PictureSource, read_source, small_picture, source_size
+from iibr_core.formats.images.picture_source import PictureSource, read_source, shown_size, small_picture, source_size
 from iibr_core.formats.images.resized_light import average_areas
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.runtime.work import raise_if_stopped
@@ -114,10 +114,10 @@ def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
     small = small_picture(path, within) if is_whole_jpeg else None
     if small is not None:
         return small
-    size = source_size(source)
+    size = shown_size(source)
     scale = min(within.height / size.height, within.width / size.width, 1.0)
     colors = read_picture(source, max(math.floor(math.prod(size) * scale**2), 1)).pixels
-    # A turned photo may still be too large, as may a very narrow one.
+    # A very narrow photo may still be too large.
     step = max(math.ceil(colors.shape[0] / within.height), math.ceil(colors.shape[1] / within.width), 1)
     return np.round(np.nan_to_num(colors[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)
 

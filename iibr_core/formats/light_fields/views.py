@@ -73,8 +73,20 @@ def in_order_of(scene: MultiView, views: Sequence[ViewUpdate]) -> list[ViewUpdat
 
 
 def offsets_by_place(scene: MultiView) -> dict[GridIndex, ViewOffset]:
-    """Return the same by the row and column of each view."""
-    return {view.place: at for view, at in zip(scene.views, view_offsets(scene)) if view.place is not None}
+    """Return the viewpoint of each view by its row and column, in steps of the grid from the view that is read first.
+
+    That is the middle view of the grid, which is not always the central one of the scene, as of a pair.
+    """
+    indices, step = indices_of(scene), step_length(scene)
+    t, s = scene.views[indices[_places_read(scene)[0]]].offset
+    offsets = {place: scene.views[index].offset for place, index in indices.items()}
+    return {place: ViewOffset((at.t - t) / step, (at.s - s) / step) for place, at in offsets.items()}
+
+
+def _places_read(scene: MultiView) -> list[GridIndex]:
+    """Return the places of the views in the order in which they are read."""
+    indices = indices_of(scene)
+    return [at for at in _nearest_to_centre(grid_of(scene)) if at in indices]
 
 
 def row_step_of(scene: MultiView) -> float:
@@ -96,7 +108,7 @@ def _nearest_to_centre(grid: GridShape) -> list[GridIndex]:
 
 def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize, wanted: Wanted) -> Iterator[ViewUpdate]:
     indices = indices_of(scene)
-    first, *others = (at for at in _nearest_to_centre(grid) if at in indices)
+    first, *others = _places_read(scene)
 
     def places() -> Iterator[GridIndex]:
         yield first

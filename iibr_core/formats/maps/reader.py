@@ -16,7 +16,7 @@ from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
 from iibr_core.formats.images.decode import complaint_of, open_header
 from iibr_core.formats.images.open_picture import open_picture
 from iibr_core.formats.images.picture import Picture, full_scale, upright
-from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
+from iibr_core.formats.images.picture_source import PictureSource, read_source, shown_size
 from iibr_core.formats.images.rgbd import GREY_TOLERANCE, MAX_COLORED_SHARE
 from iibr_core.formats.maps.color_maps import CyclicColorsError, values_of_colors
 from iibr_core.formats.maps.npy import read_named_array
@@ -89,14 +89,14 @@ def read_map_file(path: Path) -> MapFile:
 
 
 def read_map_size(path: Path) -> ImageSize:
-    """Return (height, width) of a map; only an NPZ archive and maps of other programs are read for it."""
+    """Return (height, width) of a map, upright; only an NPZ archive and maps of other programs are read for it."""
     kind = path.suffix.lower()
     if kind == ".pfm":
         return read_pfm_size(path)
     if kind in (".npy", ".npz"):
         return image_size(_read_numpy(path)[0])
     other = read_other_map(path)
-    return source_size(PictureSource(path)) if other is None else image_size(other.values)
+    return shown_size(PictureSource(path)) if other is None else image_size(other.values)
 
 
 def read_map_picture(source: PictureSource) -> MapFile:

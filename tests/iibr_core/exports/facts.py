@@ -1,13 +1,10 @@
-"""What other programs find in exported files: sizes, tags, colours, numbers, as values that JSON holds.
-
-Colours are means of blocks, each row a text such as "#ff8000 000000"; `differences` compares them channel by channel.
-"""
+"""What other programs find in exported files: sizes, tags, colours, numbers, as values that JSON holds."""
 
 import base64
 import configparser
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -22,9 +19,9 @@ from plyfile import PlyData
 
 from iibr_core.formats.maps.pfm import read_pfm
 from tests.iibr_core.exports.readers import decoded_levels, read_spz, rgb_from, stream_in
+from tests.iibr_core.facts import colors, spread
 
 EXIF, GPS = 0x8769, 0x8825
-MAX_BLOCKS = 16
 
 
 def facts_of(path: Path) -> dict[str, Any]:
@@ -38,22 +35,6 @@ def facts_of(path: Path) -> dict[str, Any]:
 
 def _of_file(path: Path) -> dict[str, Any]:
     return READERS[path.suffix](path)
-
-
-def colors(pixels: NDArray[Any]) -> list[str]:
-    """Return the means of blocks of bytes (H, W, 3) or (H, W)."""
-    pixels = np.repeat(pixels[..., None], 3, 2) if pixels.ndim == 2 else pixels[..., :3]
-    rows, columns = (min(-(-side // 8), MAX_BLOCKS) for side in pixels.shape[:2])
-    parts = [np.array_split(band, columns, axis=1) for band in np.array_split(pixels, rows)]
-    means = [[np.rint(part.mean(axis=(0, 1))).astype(int) for part in row] for row in parts]
-    return ["#" + " ".join(bytes(mean.tolist()).hex() for mean in row) for row in means]
-
-
-def spread(values: NDArray[Any]) -> list[float]:
-    """Return the least, middle and greatest of finite values, their mean, and the means of both halves."""
-    flat = np.asarray(values, np.float64).ravel()
-    parts = [flat.min(), np.median(flat), flat.max(), flat.mean(), *(part.mean() for part in np.array_split(flat, 2))]
-    return [float(f"{part:.6g}") for part in parts]
 
 
 def _picture(path: Path) -> dict[str, Any]:
@@ -208,22 +189,3 @@ READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
     ".spz": _splats, ".glb": _meshes, ".html": _page, ".json": _cameras, ".txt": _lines, ".cfg": _parameters,
     ".pfm": lambda path: _values(read_pfm(path)) | {"rows": [spread(row) for row in read_pfm(path)[::7]]},
 }  # fmt: skip
-
-
-def differences(found: Any, expected: Any, levels: float, place: str = "") -> Iterator[str]:
-    """Yield where facts differ. levels: largest difference of colours, of 0..255; numbers agree to 0.2 %."""
-    if isinstance(expected, dict) and isinstance(found, dict) and found.keys() == expected.keys():
-        for name, value in expected.items():
-            yield from differences(found[name], value, levels, f"{place}/{name}")
-    elif isinstance(expected, list | tuple) and isinstance(found, list | tuple) and len(found) == len(expected):
-        for k, value in enumerate(expected):
-            yield from differences(found[k], value, levels, f"{place}/{k}")
-    elif isinstance(expected, str) and expected.startswith("#") and isinstance(found, str):
-        one, other = (np.frombuffer(bytes.fromhex(text[1:].replace(" ", "")), np.uint8) for text in (found, expected))
-        if one.shape != other.shape or np.abs(one.astype(int) - other).max() > levels:
-            yield f"{place}: {found}, expected {expected}"
-    elif isinstance(expected, float | int) and isinstance(found, float | int):
-        if not np.isclose(found, expected, rtol=2e-3, atol=2e-3):
-            yield f"{place}: {found}, expected {expected}"
-    elif found != expected:
-        yield f"{place}: {found!r}, expected {expected!r}"

@@ -3,7 +3,6 @@
 What is found is compared with `tests/golden/exports`; what is known in closed form, with `hard_scenes`.
 """
 
-import json
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,17 +14,21 @@ from PIL import Image
 
 from iibr_core.beyond.optics import ApertureMask
 from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.exports.cameras import cameras_of
 from iibr_core.exports.kinds import ExportOptions, export_kind, export_path
-from iibr_core.exports.source import ExportSource, write_export
+from iibr_core.exports.source import ExportSource, open_for_export, write_export
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.formats.poses import read_poses
 from iibr_core.scenes.lens_choice import LensChoice
+from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core import hard_scenes as scenes
-from tests.iibr_core.exports.facts import colors, differences, facts_of
+from tests.iibr_core.exports.facts import facts_of
+from tests.iibr_core.facts import colors, differences, require_golden
+from tests.iibr_core.formats.test_every_field import middlebury_pair, stanford
 
-GOLDEN = Path(__file__).parents[2] / "golden" / "exports"
 TILTED = {"aperture": 1.5, "tilt": (0.4, -0.3), "focus_range": 0.2}
 KEYS = "\ufeff# s t focus aperture\n-2 -1 1 0\n1, 1, 0.5, 0\n\n0 0 1 0"
 """A camera path whose keys are views of the field, for every second of 6 frames."""
@@ -115,18 +118,8 @@ def export(hard: dict[str, ExportSource], row: Row, folder: Path) -> tuple[Path,
 def test_other_programs_find_what_they_found_before(hard, tmp_path, row, regenerate_golden) -> None:
     path, message = export(hard, row, tmp_path)
     message = message and re.sub(r"[\d.]+ MB", "some MB", message)
-    facts = json.loads(json.dumps(facts_of(path) | {"message": message}, default=_plain))
-    golden = GOLDEN / f"{row.kind}-{row.name}.json"
-    if regenerate_golden:
-        golden.parent.mkdir(parents=True, exist_ok=True)
-        lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(fact)}" for name, fact in facts.items())
-        golden.write_text(f"{{\n{lines}\n}}\n", "utf-8")
-    expected = json.loads(golden.read_text("utf-8"))
-    assert not list(differences(facts, expected, row.levels))
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else float(value)
+    facts = facts_of(path) | {"message": message}
+    require_golden(facts, f"exports/{row.kind}-{row.name}", row.levels, regenerate_golden)
 
 
 def seen(row: int, column: int) -> np.ndarray:
@@ -205,6 +198,20 @@ def test_cameras_state_the_metres_and_steps_of_the_scenes(hard, tmp_path) -> Non
     assert scenes.NEAR_M * (second - first) == pytest.approx((step_m, 0, 0)), "one unit is the distance of the nearest"
     depth = read_pfm(export(hard, Row("photo", "depth", "a.pfm"), tmp_path)[0])
     assert depth == pytest.approx(scenes.flat_map(scenes.NEAR_M, scenes.FAR_M), rel=1e-4)
+
+
+@pytest.mark.parametrize("write", [middlebury_pair, stanford(-30.0, 30.0)], ids=["pair", "off its grid"])
+def test_cameras_count_from_the_view_whose_points_are_written(tmp_path, write) -> None:
+    """It is the middle one of an even grid, wherever the cameras stand, and the right one of a pair."""
+    folder, given = tmp_path / "field", tmp_path / "given.npy"
+    folder.mkdir()
+    write(folder)
+    np.save(given, np.full((24, 32), 2.0, np.float32))
+    source = Source(str(folder), DepthChoice(file=str(given)))
+    kind = export_kind("colmap")
+    opened = open_for_export(kind, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
+    assert cameras_of(opened).offset(*opened.scene.grid.centre) == (0, 0)
+    assert cameras_of(opened).offset(0, 0).s == pytest.approx(-opened.scene.grid.centre[1], abs=0.02)
 
 
 def points_of(folder: Path) -> list[str]:
