@@ -31,6 +31,9 @@ SAME_RASTERISER = Tolerance(2, 0.002, 24)
 DECISIONS = Tolerance(2, 0.002, 255)
 """Golden maps: another processor may give a pixel here and there to the other side of an edge."""
 
+DEPTH_EDGES = Tolerance(2, 0.004, 255)
+"""The same for hard scenes, where a pixel beside an edge may show the surface before or behind it."""
+
 
 def problem_with(image: NDArray[np.uint8], expected: NDArray[np.uint8], tolerance: Tolerance) -> str | None:
     """What is wrong with an (H, W, 3) image, or None."""

@@ -16,7 +16,10 @@ from viewer.gpu.light_field_texture import LightFieldTexture
 
 @dataclass(frozen=True)
 class TwoPlanes:
-    """background, foreground: disparities of wall and disc, px per view step. Colours are smooth, the edge is hard."""
+    """background, foreground: disparities of wall and disc, px per view step. Colours are smooth, the edge is hard.
+
+    across, down: the disc's place in the middle view, as shares of its size.
+    """
 
     width: int = 96
     height: int = 72
@@ -24,6 +27,8 @@ class TwoPlanes:
     foreground: float = 2.0
     radius_px: float = 18.0
     contrast: float = 0.2
+    across: float = 0.5
+    down: float = 0.5
 
     def view(self, eye):
         """Colours (H, W, 3) and disparity (H, W) seen from an eye, pixel centres only."""
@@ -35,7 +40,8 @@ class TwoPlanes:
         """Colours and disparity at real places of the picture of a camera at (t, s); each place may have its own."""
         far = self._texture(x + self.background * s, y + self.background * t, hue=0.0)
         near = self._texture(x + self.foreground * s, y + self.foreground * t, hue=2.0)
-        centre_x, centre_y = self.width / 2 - self.foreground * s, self.height / 2 - self.foreground * t
+        centre_x = self.across * self.width - self.foreground * s
+        centre_y = self.down * self.height - self.foreground * t
         in_front = np.hypot(x - centre_x, y - centre_y) < self.radius_px
         disparity = np.where(in_front, self.foreground, self.background).astype(np.float32)
         return np.where(in_front[..., None], near, far), disparity

@@ -4,7 +4,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.viewer.gpu.test_golden_optics import check, drawn, require_llvmpipe
 from viewer.gpu.context import create_headless, usual_backends
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 
 def test_contexts_come_and_go_in_one_process():
@@ -37,3 +39,13 @@ def test_pictures_without_a_window_load_no_window_library():
         "assert not loaded, loaded\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
+
+
+def test_a_context_without_egl_draws_the_same(tmp_path):
+    gl = create_headless("osmesa")
+    renderer = Renderer(gl)
+    require_llvmpipe(renderer)
+    check("all", drawn(renderer, "all"), tmp_path, False)
+    renderer.field.release()
+    renderer.release()
+    gl.release()
