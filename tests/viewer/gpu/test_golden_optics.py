@@ -169,7 +169,7 @@ def inspected(passes, field, values):
         (Line(3, 0.4, is_upright=True, span=(0.2, 0.7)), 0.5, None),
         (Line(2, 0.6, span=(0.1, 0.6)), 1.0, GLOSS),
         (Line(3, 0.4, is_upright=True), 2.0, MIRROR),
-        (Line(1, 0.9), 1.0, MIRROR),
+        (Line(0, 0.9), 1.0, MIRROR),
     ):
         passes.draw_epi(field, line, SIZE, exposure, gloss)
         yield passes.read("upright" if line.is_upright else "across")[..., :3]
