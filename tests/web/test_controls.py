@@ -83,14 +83,6 @@ def test_a_wheel_over_a_frame_without_focus_scrolls_the_page_around_it(tab, page
     tab.wait_until("scrollY > 0")
 
 
-def test_letters_work_with_caps_lock_and_on_a_slider(shown) -> None:
-    first = shown.evaluate(LENS)
-    slide(shown, "focus", 0.3)
-    shown.evaluate("document.getElementById('focus').focus()")
-    shown.press("R")
-    assert shown.evaluate(LENS) == first
-
-
 def test_sliders_speak_words(shown) -> None:
     def words() -> dict[str, str]:
         return shown.evaluate(
