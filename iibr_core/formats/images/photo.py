@@ -116,8 +116,9 @@ def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
         return small
     size = shown_size(source)
     scale = min(within.height / size.height, within.width / size.width, 1.0)
-    colors = read_picture(source, max(math.floor(math.prod(size) * scale**2), 1)).pixels
-    # A very narrow photo may still be too large.
+    sides = (max(side * scale, 1) for side in size)  # a very narrow photo keeps its length
+    colors = read_picture(source, math.floor(math.prod(sides))).pixels
+    # Rounding may leave a pixel too many.
     step = max(math.ceil(colors.shape[0] / within.height), math.ceil(colors.shape[1] / within.width), 1)
     return np.round(np.nan_to_num(colors[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)
 

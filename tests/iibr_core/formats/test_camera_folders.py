@@ -35,64 +35,6 @@ def write_scene(
     return folder
 
 
-def turn_world(folder: Path) -> None:
-    """Give transforms.json another world: turned, moved and larger."""
-    half = np.sqrt(0.5)
-    turn = np.array([[half, 0, half], [0.5, half, -0.5], [-0.5, half, 0.5]])
-    content = json.loads((folder / "transforms.json").read_text())
-    for frame in content["frames"]:
-        matrix = np.array(frame["transform_matrix"])
-        matrix[:3] = turn @ matrix[:3]
-        matrix[:3, 3] = 3 * matrix[:3, 3] + (5, -2, 1)
-        frame["transform_matrix"] = matrix.tolist()
-    (folder / "transforms.json").write_text(json.dumps(content))
-
-
-@pytest.mark.parametrize("kind", ["LLFF", "nerfstudio", "COLMAP"])
-@pytest.mark.parametrize("row_step", [1.0, 0.4, 2.5])
-def test_cameras_on_a_grid_are_a_light_field(tmp_path, kind, row_step) -> None:
-    """Whatever the order of names; rows may lie closer than columns or farther apart."""
-    offsets = {f"{9 - k}.png": ViewOffset(row_step * t, s) for k, (t, s) in enumerate(OFFSETS.values())}
-    scene = open_light_field(write_scene(tmp_path / "scene", kind, offsets))
-    assert (scene.name, scene.layout, scene.grid, scene.focal_px) == ("scene", f"{kind}, 3x2", (2, 3), 20.0)
-    assert scene.infinity_px == 0
-    assert scene.range_px == (pytest.approx((1, 4)) if kind == "LLFF" else None)
-    assert {view.path.name: view.offset.s - scene.views[0].offset.s for view in scene.views} == pytest.approx(
-        {name: offset.s - offsets[scene.views[0].path.name].s for name, offset in offsets.items()}
-    )
-    assert {view.path.name: view.offset.t - scene.views[0].offset.t for view in scene.views} == pytest.approx(
-        {name: offset.t - offsets[scene.views[0].path.name].t for name, offset in offsets.items()}
-    )
-    places = {view.path.name: view.place for view in scene.views}
-    assert [places[f"{9 - k}.png"] for k in range(6)] == list(np.ndindex(*GRID))
-    if kind != "LLFF":
-        other = write_scene(tmp_path / "other", kind, OFFSETS, -1.5)
-        assert open_light_field(other).infinity_px == -1.5, "principal points that move give it"
-        (other / "images" / "v01_u02.png").unlink()
-        with pytest.raises(InputError, match=r"the picture \S*v01_u02.png of a camera is missing"):
-            open_light_field(other)
-
-
-def test_worlds_may_be_turned_and_cameras_stand_a_little_off(tmp_path) -> None:
-    jittered = {name: ViewOffset(t, s + 0.02 * (-1) ** k) for k, (name, (t, s)) in enumerate(OFFSETS.items())}
-    folder = write_scene(tmp_path / "scene", "nerfstudio", jittered)
-    turn_world(folder)
-    scene = open_light_field(folder)
-    assert scene.grid == GRID
-    assert [view.place for view in scene.views] == list(np.ndindex(*GRID))
-    assert scene.views[1].offset.s - scene.views[0].offset.s == pytest.approx(0.96, abs=0.02), "as they stand"
-
-
-def test_turned_pictures_have_turned_viewpoints(tmp_path) -> None:
-    """What such a picture stores to the right is shown below."""
-    offsets = {name.replace("png", "jpg"): at for name, at in OFFSETS.items()}
-    scene = open_light_field(write_scene(tmp_path / "scene", "nerfstudio", offsets, orientation=6))
-    assert (scene.grid, scene.layout) == ((3, 2), "nerfstudio, 2x3")
-    for view, (v, u) in zip(scene.views, np.ndindex(*GRID)):
-        assert view.place == (u, 1 - v)
-        assert np.subtract(view.offset, scene.views[0].offset) == pytest.approx((u, -v))
-
-
 TURNED = [[0.995, 0, 0.0998, 0], [0, 1, 0, 0], [-0.0998, 0, 0.995, 0], [0, 0, 0, 1]]
 OFF_COLUMN, NEARER = np.eye(4), np.eye(4)
 OFF_COLUMN[0, 3] = NEARER[2, 3] = 0.05

@@ -95,50 +95,6 @@ def require_refusal(match, read, *args, **options):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("kind", "at_infinity"),
-    [("llff", 0.0), ("nerfstudio", 0.0), ("nerfstudio", 0.5), ("colmap", 0.0), ("colmap", -0.5)],
-)
-def test_round_trip(tmp_path, kind, at_infinity):
-    written, read = write_field(tmp_path, kind, at_infinity), read_poses(tmp_path)
-    first = read[0].world_from_camera
-    assert len(read) == 6
-    for camera, (_, offset) in zip(read, sorted(VIEWS.items())):
-        np.testing.assert_allclose(first.T @ camera.world_from_camera, np.eye(3), atol=1e-12)
-        place = first.T @ (camera.position - read[0].position)
-        expected = np.subtract(written.place(offset), written.place(FIELD.offset(0, 0)))
-        np.testing.assert_allclose(place, expected, atol=1e-12)
-        np.testing.assert_allclose(np.add(camera.centre_px, 0.5), written.principal_point(offset))
-        assert (camera.size, camera.focal_px) == (FIELD_SIZE, (50.0, 50.0))
-        assert camera.depth_range == (pytest.approx(written.depth_range) if kind == "llff" else None)
-
-
-def test_opengls_axes_are_turned(tmp_path):
-    (camera,) = read_transforms(tmp_path)
-    np.testing.assert_array_equal(camera.world_from_camera @ (0.0, 1.0, 1.0), (0.0, -1.0, -1.0))
-    assert (camera.focal_px, camera.centre_px) == ((50.0, 50.0), (23.5, 19.5))
-
-
-@pytest.mark.parametrize(("angle", "focal_px"), [(np.pi / 2, 24.0), (np.pi / 3, 24.0 * np.sqrt(3))])
-def test_an_angle_gives_the_focal_length_and_frames_override_the_file(tmp_path, angle, focal_px):
-    frame = {"transform_matrix": np.eye(4)[:3].tolist(), "camera_angle_x": angle, "cy": 7.5}
-    (camera,) = read_transforms(tmp_path, fl_x=None, camera_angle_x=1.0, cy=1.0, frames=[frame])
-    assert camera.focal_px[0] == pytest.approx(focal_px)
-    assert camera.centre_px == (23.5, 7.0)
-
-
-def test_colmaps_quaternion_is_from_the_world(tmp_path):
-    write_field(tmp_path, "colmap")
-    half = np.sqrt(0.5)
-    line = f"\ufeff1 {half} 0 0 {half} 1 2 3 1 a b.png\n\n"  # a quarter turn about z
-    (tmp_path / "sparse/0/images.txt").write_text(line, "utf-8")
-    (tmp_path / "sparse/0/images.bin").unlink()
-    (camera,) = read_poses(tmp_path)
-    np.testing.assert_allclose(camera.world_from_camera.T @ (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), atol=1e-12)
-    np.testing.assert_allclose(camera.world_from_camera.T @ -camera.position, (1.0, 2.0, 3.0), atol=1e-12)
-    assert camera.source.endswith("a b.png")
-
-
 def test_colmaps_binary_model_holds_the_same_as_its_text(tmp_path):
     """Programs take only the one or the other, and some stop reading text at an empty line."""
     points, colors = np.float32([[0.5, -2, 4], [1, 2, 3]]), np.uint8([[1, 2, 3], [250, 251, 252]])

@@ -3,7 +3,6 @@ import zlib
 from io import BytesIO
 
 import numpy as np
-import pillow_heif
 import pytest
 import tifffile
 from PIL import Image, ImageCms
@@ -100,30 +99,6 @@ def test_the_curve_of_a_profile_counts_for_floats_too(tmp_path, curve, is_grey):
     is_white = np.broadcast_to(stored > 1, expected.shape)
     np.testing.assert_allclose(read[~is_white], expected[~is_white], atol=1e-3)
     assert (read[is_white] > expected[is_white]).all()
-
-
-@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.webp", "a.heic"])
-def test_every_format_with_profiles_is_converted(tmp_path, name):
-    patch = np.full((32, 32, 3), (200, 80, 60), np.uint8)
-    if name.endswith("heic"):
-        pillow_heif.from_pillow(Image.fromarray(patch)).save(tmp_path / name, icc_profile=profile_bytes(), quality=100)
-    else:
-        exact = {"quality": 100} if name.endswith("jpg") else {"lossless": True} if name.endswith("webp") else {}
-        Image.fromarray(patch).save(tmp_path / name, icc_profile=profile_bytes(), **exact)
-    for max_pixels in (2000, 100):
-        photo = read_photo(tmp_path / name, max_pixels)
-        assert np.abs(255 * photo.pixels - (216, 69, 50)).max() < 2.5, "P3's (200, 80, 60)"
-
-
-def test_numbers_of_a_heic_count_without_a_profile(tmp_path):
-    patch = Image.fromarray(np.full((32, 32, 3), (200, 80, 60), np.uint8))
-    for primaries, expected in ((12, DISPLAY_P3), (1, SRGB)):
-        codes = {"color_primaries": primaries, "transfer_characteristics": 13, "matrix_coefficients": 6}
-        file = pillow_heif.from_pillow(patch)
-        file.save(tmp_path / "a.heic", quality=100, chroma=444, full_range_flag=1, save_nclx_profile=True, **codes)
-        photo = read_photo(tmp_path / "a.heic", keeps_primaries=True)
-        assert photo.color_space == expected
-        assert np.abs(255 * photo.pixels - (200, 80, 60)).max() < 2.5
 
 
 @pytest.mark.parametrize(

@@ -167,6 +167,11 @@ def transforms(folder: Path) -> None:
     (folder / "transforms.json").write_text(f"\ufeff{json.dumps(content)}", "utf-8")
 
 
+def without(write: Write, name: str) -> Write:
+    """Return a writer of the same but for one picture."""
+    return lambda folder: (write(folder), (folder / name).unlink())
+
+
 def write_named(folder: Path, pattern: str, rows: int, columns: int) -> dict[str, tuple[float, float]]:
     views = named(pattern, range(rows), range(columns))
     write_views(folder / "images", {f"{name}.png": at for name, at in views.items()})
@@ -222,6 +227,7 @@ LAYOUTS: dict[str, Write] = {
     "turned": views(named("v{v}_u{u}.jpg", range(2), range(3)), TURNED),
     "from the middle": views(named("image_{v:+d}_{u:+d}.png", range(-1, 2), range(-2, 3))),
     "columns first/views": views(named("{u:03d}_{v:03d}.ppm", range(1, 3), range(4))),
+    "columns hole": views({f"{u:03d}_{v:03d}.ppm": (v, u) for v, u in np.ndindex(3, 4) if (v, u) != (0, 1)}),
     "stated": with_parameters(views(named("shot {k}.png", range(3), range(4), 5)), STATED),
     "too many": with_parameters(views(named("shot {k}.png", range(4), range(4))), STATED),
     "guessed": views(named("beach {k}.png", range(1), range(5))),
@@ -231,7 +237,8 @@ LAYOUTS: dict[str, Write] = {
     "stanford up": stanford(-30.0, 30.0), "stanford left": stanford(12.0, -30.0), "stanford even": stanford(0.0, 0.0),
     "rendered": stanford(5.0, 5.0, "Camera 1_{v:02d}_{u:02d}_{y:f}_{x:f}_30_36.png"),
     "middlebury": middlebury, "middlebury pair": middlebury_pair, "llff": llff, "llff free": llff_free,
-    "colmap": colmap(False), "colmap text": colmap(True), "transforms": transforms,
+    "colmap": colmap(False), "colmap text": colmap(True), "llff hole": without(llff, "images/v0_u1.png"),
+    "colmap hole": without(colmap(False), "images/pic 01.png"), "transforms": transforms,
     "nerfstudio": lambda folder: write_hard_field(folder / "field"),
     "quilt": quilt("a_qs4x2a3.png", Quilt(4, 2, ImageSize(49, 130), 3.0)),
     "quilt frame": quilt("a Quilt_3x2a0.75z1.2f0.5_0012.png", Quilt(3, 2, ImageSize(48, 72), 0.75)),

@@ -28,8 +28,8 @@ HOLES[0, 0], HOLES[9, 30], HOLES[-1, -1], HOLES[20, 3] = np.nan, np.inf, -np.inf
 WHOLE = np.rint(RAMP * 20).astype(np.uint16)
 ZEROS = WHOLE.copy()
 ZEROS[:, :6] = 0
-SPARSE = np.full((64, 96), np.nan, np.float32)
-SPARSE[::7, ::7] = RAMP.repeat(2, 0).repeat(2, 1)[::7, ::7]
+SPARSE = np.full((96, 144), np.nan, np.float32)
+SPARSE[::7, ::7] = RAMP.repeat(3, 0).repeat(3, 1)[::7, ::7]
 SIZE = struct.pack("<ii", 48, 32)
 LITTLE, BIG = RAMP.astype("<f4"), RAMP.astype(">f4")
 

@@ -20,7 +20,6 @@ from iibr_core.types import DISPLAY_P3
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.facts import require_golden
 from tests.iibr_core.formats.opened import photo_facts
-from tests.iibr_core.formats.test_file_kinds import GPANO, psd
 from tests.iibr_core.formats.test_side_by_side import LEFT, RIGHT, write_jps
 from tests.iibr_core.formats.test_view_files import leia_image, lume_pad_2, write_mpo, write_stereo_jpeg
 from tests.iibr_core.hard_scenes import TURNED, lying, photo_colors
@@ -106,9 +105,19 @@ def recording(path: Path) -> None:
             archive.writestr(f"rgbd/{number}.depth", b"bvx-")
 
 
-def panorama(kind: str) -> bytes:
-    about = {f"{GPANO} ProjectionType": "equirectangular", f"{embedded.GIMAGE} Mime": "image/jpeg"}
-    return with_xmp(Image.fromarray(PICTURE), kind, embedded.packet(about))
+GPANO = "http://ns.google.com/photos/1.0/panorama/"
+
+
+def psd() -> bytes:
+    """Version 1, 3 channels of 8 bits, RGB, no layers; the picture itself is not packed."""
+    head = b"8BPS\0\x01" + bytes(6) + struct.pack(">HIIHH", 3, HEIGHT, WIDTH, 8, 3)
+    return head + bytes(12) + b"\0\0" + PICTURE.transpose(2, 0, 1).tobytes()
+
+
+def panorama(kind: str, **about: str) -> bytes:
+    return with_xmp(
+        Image.fromarray(PICTURE), kind, embedded.packet({f"{GPANO} {name}": text for name, text in about.items()})
+    )
 
 
 def every_other_row(right_first: bool) -> np.ndarray:
@@ -121,6 +130,7 @@ def with_bad_end(kind: str, share: float) -> bytes:
     return stored[: int(share * len(stored))]
 
 
+RIGHT_EYE = {f"{GPANO} ProjectionType": "cylindrical ", f"{embedded.GIMAGE} Mime": "image/jpeg"}
 DOUBLE = np.hstack([PICTURE, np.repeat(DEPTH[..., None], 3, 2)])
 TILES = np.vstack([np.hstack([LEFT[:48, :64], RIGHT[:48, :64], LEFT[:48, :64], RIGHT[:48, :64]])] * 3)
 FILES: dict[str, tuple[Callable[[Path], object], int]] = {
@@ -147,7 +157,12 @@ FILES: dict[str, tuple[Callable[[Path], object], int]] = {
     "odd.exr": (by_oiio(ODD_LIGHT, Orientation=2), 1), "half.exr": (by_oiio(LIGHT, kind="half"), 1),
     "light.hdr": (by_oiio(LIGHT), 2), "grey.exr": (by_oiio(LIGHT[..., 1] / 3), 1),
     "a.gif": (by_frames(), 4), "a.png": (by_frames(), 1), "a.webp": (by_frames(lossless=True), 1),
-    "panorama.jpg": (of_bytes(panorama("JPEG")), 3), "panorama.png": (of_bytes(panorama("PNG")), 1),
+    "panorama.jpg": (of_bytes(panorama("JPEG", ProjectionType="equirectangular")), 3),
+    "panorama.png": (of_bytes(panorama("PNG", FullPanoWidthPixels="8192")), 1),
+    "stitched.tif": (of_bytes(panorama("TIFF", SourcePhotosCount="1")), 1),
+    "broken.jpg": (of_bytes(with_xmp(Image.fromarray(PICTURE), "JPEG", f"<broken {GPANO}".encode())), 3),
+    "right_eye.jpg": (of_bytes(with_xmp(Image.fromarray(PICTURE), "JPEG", embedded.packet(RIGHT_EYE))), 3),
+    "narrow.png": (by_pillow(pixels=np.ascontiguousarray(PICTURE[:1].repeat(5, 1))), 1),
     "crossed.jps": (by_pillow(pixels=np.hstack([RIGHT, LEFT]), kind="JPEG", quality=95), 3),
     "half_HTAB - Copy (2).png": (by_pillow(pixels=np.vstack([LEFT[::2], RIGHT[::2]])), 1),
     "flipped.right-left.png": (by_pillow(pixels=np.hstack([RIGHT, LEFT])), 1),

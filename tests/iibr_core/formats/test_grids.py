@@ -33,18 +33,6 @@ def write_flat(folder: Path, names: list[str]) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(4, 2), (1, 3), (3, 5)])
-def test_hci_names_count_row_by_row(tmp_path, rows, columns) -> None:
-    folder = write_hci(tmp_path / "dino", rows, columns)
-    write_image(folder / "objectids_highres.png", np.zeros((9, 9, 3), np.uint8))  # comes with the data set
-    scene = open_light_field(folder)
-    assert (scene.name, scene.layout) == ("dino", f"HCI 4D light field, {columns}x{rows}")
-    wanted = {f"input_Cam{v * columns + u:03d}": at for (v, u), at in offsets_of(rows, columns).items()}
-    assert offset_by_file(scene) == wanted
-    assert list(scene.disparity) == [scene.centre]
-    assert scene.disparity[scene.centre].is_truth
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -72,21 +60,6 @@ def test_grids_under_any_numbering(tmp_path, name) -> None:
     assert list(scene.disparity) == [scene.centre]
 
 
-def test_jpeg_pleno_counts_columns_first(tmp_path) -> None:
-    """The field has the name of its folder, not of the folder of views in it."""
-    views = tmp_path / "boxes" / "views"
-    views.mkdir(parents=True)
-    for row, column in np.ndindex(3, 4):
-        Image.new("RGB", (4, 4)).save(views / f"{column + 1:03d}_{row + 1:03d}.ppm")
-    for folder in (tmp_path / "boxes", views):
-        scene = open_light_field(folder)
-        assert (scene.name, scene.grid) == ("boxes", GridShape(3, 4))
-    assert {view.path.stem for view in scene.views if view.place == (2, 0)} == {"001_003"}
-    (views / "002_001.ppm").unlink()
-    with pytest.raises(InputError, match=r"row 0, column 1 is missing \(1 of 3x4"):
-        open_light_field(views)
-
-
 @pytest.mark.parametrize("count", [4, 9, 16, 25])
 def test_a_few_numbered_photos_are_no_light_field(tmp_path, count) -> None:
     write_flat(tmp_path, [f"beach {n + 1}.png" for n in range(count)])
@@ -112,21 +85,6 @@ def test_a_few_numbered_photos_are_no_light_field(tmp_path, count) -> None:
 )
 def test_views_at_regular_gaps_are_a_smaller_grid(tmp_path, names, grid) -> None:
     assert open_light_field(write_flat(tmp_path, names)).grid == grid
-
-
-@pytest.mark.parametrize("name", ["input_Cam{k:03d}.png", "v{v:02d}_u{u:02d}.png"])
-@pytest.mark.parametrize("count", [17, 33])
-def test_a_star_is_opened_without_the_views_between(tmp_path, name, count) -> None:
-    places = [(v, u) for v, u in np.ndindex(9, 9) if 4 in (v, u) or (count == 33 and v in (u, 8 - u))]
-    star = write_flat(tmp_path, [name.format(v=v, u=u, k=9 * v + u) for v, u in places])
-    (star / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 9\nnum_cams_y = 9\n")
-    scene = open_light_field(star)
-    assert (scene.grid, len(scene.views)) == ((9, 9), count)
-    assert scene.layout.split(", ")[1:] == ["9x9", f"{count} views: a star"]
-    assert {(view.row, view.column) for view in read_views(scene)[1]} == set(places)
-    (star / name.format(v=4, u=1, k=37)).unlink()
-    with pytest.raises(InputError, match=rf"\({82 - count} of 9x9 views are\)"):
-        open_light_field(star)
 
 
 def test_a_given_grid_opens_pictures_under_any_names(tmp_path) -> None:
@@ -187,24 +145,6 @@ def offsets_by_index(scene: MultiView) -> dict[tuple[int, int], np.ndarray]:
     """Viewpoints (t, s) from that of row 0 and column 0, by row and column in the names."""
     by_index = {tuple(map(int, view.path.stem.split("_")[1:3])): np.array(view.offset) for view in scene.views}
     return {index: offset - by_index[0, 0] for index, offset in by_index.items()}
-
-
-@pytest.mark.parametrize("jitter", [0.0, 0.1])
-def test_stanford_viewpoints_are_the_cameras_positions(tmp_path, jitter) -> None:
-    """Rows are counted upwards and columns leftwards; positions are in millimetres, slightly off the grid."""
-    rng = np.random.default_rng(3)
-    steps = {at: -np.array(at) + rng.uniform(-jitter, jitter, 2) for at in np.ndindex(5, 4)}
-    scene = write_archive(tmp_path / "rectified", {at: (100 + 30 * t, 30 * s) for at, (t, s) in steps.items()})
-    scene = scene_of(tmp_path)
-    assert (scene.layout, scene.grid) == ("Stanford archive, 4x5", (5, 4))
-    for at, offset in offsets_by_index(scene).items():
-        np.testing.assert_allclose(offset, steps[at] - steps[0, 0], atol=2 * jitter + 1e-6)
-    assert {view.path.stem[:9]: view.place for view in scene.views}["out_04_03"] == (0, 0)
-    assert ("stand up to" in scene.notes[0]) == (jitter > 0)
-    at = list(np.ndindex(3, 3))  # a renderer writes focal length and sensor after the position
-    names = [f"Camera 1_{v:02d}_{u:02d}_{10.0 - 5 * v:f}_{5.0 * u:f}_30_36.png" for v, u in at]
-    rendered = scene_of(write_flat(tmp_path / "rendered", names))
-    assert {view.path.stem[:14]: view.place for view in rendered.views}["Camera 1_02_01"] == (0, 1)
 
 
 @pytest.mark.parametrize(("rows", "columns", "step"), [(3, 3, 20.0), (3, 1, 45.0), (1, 3, 20.0)])

@@ -4,17 +4,13 @@ import os
 import numpy as np
 import pytest
 import tifffile
-from PIL import Image
 
-from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images import photo as photo_module
 from iibr_core.formats.images.open_picture import open_picture
-from iibr_core.formats.images.photo import read_photo, read_thumbnail
-from iibr_core.formats.images.picture import FILM_DIAGONAL_MM
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PictureSource, read_source
-from iibr_core.formats.images.write import write_image
 from iibr_core.types import ImageSize, InputError
-from tests.iibr_core.formats.test_color_profile import profile_bytes
 from tests.iibr_core.pictures import write_oiio
 
 RNG = np.random.default_rng(7)
@@ -64,18 +60,6 @@ def test_the_photo_of_a_tiff_follows_its_preview(tmp_path, is_marked):
     assert read_photo(tmp_path / "pages.tif").size == preview.shape[:2]
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.webp"])
-def test_alpha_is_dropped_over_black_in_linear_light(tmp_path, name):
-    rgba = RGBA.copy()
-    rgba[2:5, :, 3] = 128
-    rgba[5:7, :, 3] = 0
-    Image.fromarray(rgba).save(tmp_path / name, **({"lossless": True, "exact": True} if name == "a.webp" else {}))
-    photo = read_photo(tmp_path / name)
-    expected = srgb_from_linear(linear_from_srgb(rgba[..., :3] / 255) * (rgba[..., 3:] / 255))
-    assert np.abs(photo.pixels - expected).max() < 1e-5
-    assert photo.notes == ("Transparency was dropped: the photo is laid over black.",)
-
-
 @pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.hdr"])
 def test_float_files_hold_linear_light(tmp_path, name):
     linear = RNG.uniform(0.1, 6, (5, 9, 3)).astype(np.float32)
@@ -120,18 +104,6 @@ def test_exif_orientation(tmp_path, orientation):
     smaller = read_photo(path, max_pixels=60)
     sizes = open_picture(path).upright_size, smaller.size
     assert smaller.notes == ("Made smaller by area averaging, from {} to {}.".format(*sizes),)
-
-
-def test_focal_length_from_35_mm_equivalent_or_50_degrees(tmp_path):
-    pixels = np.zeros((200, 300, 3), np.uint8)
-    assert read_photo(write_oiio(tmp_path / "b.jpg", pixels)).focal_px == pytest.approx(
-        150 / math.tan(math.radians(25))
-    )
-    path = write_oiio(tmp_path / "a.jpg", pixels, Exif__FocalLengthIn35mmFilm=50)
-    assert read_photo(path).focal_px == pytest.approx(50 / FILM_DIAGONAL_MM * math.hypot(200, 300), rel=1e-5)
-    smaller = read_photo(path, max_pixels=15_000)
-    assert smaller.size == (100, 150)
-    assert smaller.focal_px == pytest.approx(read_photo(path).focal_px / 2, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -206,36 +178,3 @@ def test_a_jpeg_that_is_cut_off_opens_as_far_as_it_goes_but_is_no_view_and_no_ma
     assert "cut off" in photo.notes[0]
     with pytest.raises(InputError, match=r"cut\.jpg: cut off; get the whole file again"):
         read_source(PictureSource(path))
-
-
-def test_an_avif_is_turned_and_has_focal_length_and_profile(tmp_path):
-    exif = Image.Exif()
-    exif[ORIENTATION] = 6  # the camera was held upright: turn right
-    exif.get_ifd(0x8769)[0xA405] = 50
-    options = {"quality": 100, "exif": exif.tobytes(), "icc_profile": profile_bytes()}
-    Image.fromarray(halves(48, 64)).save(tmp_path / "a.avif", **options)
-    photo = read_photo(tmp_path / "a.avif")
-    assert photo.size == (64, 48)
-    assert photo.pixels[10, 24, 0] > 0.7 > 0.1 > photo.pixels[50, 24, 0], "left is up now"
-    assert photo.focal_px == pytest.approx(50 / FILM_DIAGONAL_MM * 80)
-    assert photo.notes[0] == "Colours are those of the photo's profile, 'made here'."
-
-
-def halves(height: int, width: int) -> np.ndarray:
-    pixels = np.zeros((height, width, 3), np.uint8)
-    pixels[:, : width // 2, 0] = pixels[:, width // 2 :, 2] = 200
-    return pixels
-
-
-def test_thumbnails_fit_and_show_the_photo_or_its_left_picture(tmp_path) -> None:
-    pair = np.hstack([halves(40, 64), halves(40, 64)])
-    pictures = {"a.jpg": halves(48, 80), "a.png": halves(90, 30), "a_SBS.jpg": pair, "a.webp": halves(1, 400)}
-    for name, pixels in pictures.items():
-        Image.fromarray(pixels).save(tmp_path / name)
-        small = read_thumbnail(tmp_path / name, WITHIN)
-        assert small.dtype == np.uint8
-        assert all(1 <= side <= most for side, most in zip(small.shape[:2], WITHIN))
-        middle = small[len(small) // 2].astype(int)
-        assert len(pixels) == 1 or middle[1, 0] > 150 > 60 > middle[-3, 0], name
-    write_image(tmp_path / "a.exr", np.full((30, 30, 3), 5.0, np.float32))
-    assert read_thumbnail(tmp_path / "a.exr", WITHIN)[-1, -1].tolist() == [255, 255, 255]

@@ -1,7 +1,6 @@
 import json
 import re
 import struct
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from iibr_core.depth.embedded.embedded import read_embedded
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.heic import heic_pair
 from iibr_core.formats.images.iso_boxes import with_primary
-from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields import views as views_module
@@ -24,7 +22,7 @@ from iibr_core.scenes.light_fields import find_disparity
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core.embedded_files import picture
-from tests.iibr_core.known_scenes import FOREGROUND, view_of_square, view_of_wall
+from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
 
 HEIGHT, WIDTH = 6, 9
 RNG = np.random.default_rng(0)
@@ -78,15 +76,6 @@ def test_copies_of_quilts_and_lenslet_images_open_by_their_names(tmp_path, copy)
     assert (open_light_field(lenslet).name, open_light_field(lenslet).grid) == ("scene", GridShape(8, 8))
 
 
-def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path) -> None:
-    whole = RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)
-    Image.fromarray(whole).save(tmp_path / "img_1_eslf.png")
-    views = read_back(tmp_path / "img_1_eslf.png")
-    assert max(views) == (7, 7)
-    np.testing.assert_array_equal(views[0, 0], whole[3::14, 3::14])
-    np.testing.assert_array_equal(views[4, 6], whole[7::14, 9::14])
-
-
 def smooth(height: int = 48, width: int = 64, shift: int = 0) -> np.ndarray:
     y, x = np.mgrid[0:height, 0:width]
     return np.stack([127 + 100 * np.sin((x + shift) / 9), 2.0 * y, x + 0.0 * y], -1).astype(np.uint8)
@@ -131,33 +120,6 @@ def lume_pad_2(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes]) ->
     ]
     described = json.dumps({"disparitySource": "LEIA_STEREO", "views": views}).encode()
     return lif(left, described, (1000001, picture(right)), *more)
-
-
-STEREO: dict[str, tuple[str, Callable[..., object], str]] = {
-    "spatial": ("a.heic", lambda path, *eyes: write_spatial_photo(path, *eyes, 80.0), "spatial HEIC"),
-    "mpo": ("a.mpo", write_mpo, "MPO stereo"),
-    "stereo jpeg": ("a.jpg", write_stereo_jpeg, "MPO stereo"),
-    "leia": ("a.jpg", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
-    "lume pad 2": ("a.jpg", lambda path, *eyes: path.write_bytes(lume_pad_2(*eyes)), "Leia stereo"),
-    "lif": ("a.lif", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
-}
-
-
-@pytest.mark.parametrize("kind", STEREO)
-def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path, kind) -> None:
-    name, write, layout = STEREO[kind]
-    left, right = smooth(), smooth(shift=4)
-    path = tmp_path / name
-    write(path, left, right)
-    scene = open_light_field(path)
-    assert (scene.layout, scene.grid, scene.place) == (layout, GridShape(1, 2), path)
-    assert not is_light_field(path)  # it opens as a photo with depth
-    views = read_back(path)
-    for at, expected in (((0, 0), left), ((0, 1), right)):
-        assert views[at].shape == expected.shape
-        assert np.abs(views[at].astype(int) - expected).mean() < 3
-    photo = read_photo(path)
-    np.testing.assert_allclose(photo.pixels * 255, views[0, 0], atol=0.51)
 
 
 def test_a_spatial_photo_may_show_its_right_picture_but_no_unknown_one(tmp_path) -> None:
@@ -302,13 +264,3 @@ def test_two_pictures_of_one_scene_are_a_pair_under_any_names(tmp_path) -> None:
     found = open_with_depth(folder / "a.png", DepthChoice(right=str(folder / "b.png")))
     assert found.origin.words == "the photo's two views (stereo, two files)"
     assert np.median(found.disparity.values[16:24, 20:28]) == pytest.approx(2 * FOREGROUND, abs=0.6)
-
-
-@pytest.mark.parametrize(("rows", "columns"), [(6, 8), (3, 3), (1, 7)])
-def test_a_photo_that_looks_like_tiles_of_one_scene_says_so(tmp_path, rows, columns) -> None:
-    tiles = [[view_of_wall(ViewOffset(r, c), 0.5) for c in range(columns)] for r in range(rows)]
-    mosaic = np.vstack([np.hstack(row) for row in tiles])
-    Image.fromarray((mosaic * 255).astype(np.uint8)).save(tmp_path / "mosaic.png")
-    assert f"let its name end in _qs{columns}x{rows}." in read_photo(tmp_path / "mosaic.png").notes[-1]
-    Image.fromarray((view_of_wall(ViewOffset(0, 0), size=(60, 80)) * 255).astype(np.uint8)).save(tmp_path / "one.png")
-    assert read_photo(tmp_path / "one.png").notes == ()
