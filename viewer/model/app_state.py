@@ -50,10 +50,11 @@ class AppState:
     a window. zoom: None for the whole picture.
     free_camera: None in the plane of the views; free_progress: share of its preparation, None once done. depth:
     refinement and edits; stroke: of the brush while it is drawn. chosen_focus: disparity that the user chose for this
-    scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
-    of the one before. hides_panel: None to follow the window; hid_panel: the same before full screen. shows_before:
-    whether the unchanged photo is shown. tracking: None unless the viewpoint follows the head. files: saved and
-    exported in this run, the latest first. monitors: the connected ones, that of the window first.
+    scene, focused_at: place that was clicked for it (see focal_plane), None without. restoring: optics now, and those
+    that the photo was left with, while its views are made again with the depth that it was left with. facts: of a
+    photo's file, perhaps of the one before. hides_panel: None to follow the window; hid_panel: the same before full
+    screen. shows_before: whether the unchanged photo is shown. tracking: None unless the viewpoint follows the head.
+    files: saved and exported in this run, the latest first. monitors: the connected ones, that of the window first.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -94,6 +95,7 @@ class AppState:
     focus_before: float | None = None
     has_chosen_aperture: bool = False
     focused_at: tuple[float, float] | None = None
+    restoring: tuple[Optics, Optics] | None = None
     has_dialogs: bool = False
     shown_generation: int = 0
     folder: PhotoFolder | None = None

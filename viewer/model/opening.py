@@ -129,9 +129,11 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
         focus_before=_carried_focus(state.focus_before, state.optics, carried),
         inspection=replace(state.inspection, probe=None),
     )
+    shown = replace(shown, restoring=None)
     if old is None or not is_same:
         shown = _begin_scene(shown, old, scene)
     else:
+        shown = _with_restored_optics(shown, state, scene)
         shown = shown if new_depth is None else _with_left_focus(shown)
         shown = _add_notices(shown, scene) if old.is_sketch and not scene.is_sketch else shown
     return shown
@@ -155,8 +157,9 @@ def restore_session(state: AppState, scene: Scene, settings: SavedSettings, lost
     has_aperture = settings.optics.aperture_diameter > 0
     restored = replace(restored, chosen_focus=restored.optics.focus_disparity, has_chosen_aperture=has_aperture)
     restored = replace(restored, focused_at=settings.focused_at)
-    has_other_model = settings.depth_model not in ("", scene.depth_model)
-    if has_other_model or (settings.has_model_depth and scene.is_guessed):  # the focus belongs to another depth
+    has_other_depth = settings.depth_model not in ("", scene.depth_model)
+    has_other_depth |= settings.has_model_depth and scene.is_guessed
+    if has_other_depth:  # the focus belongs to another depth
         optics = with_focus_of(restored.optics, Optics())
         restored = replace(restored, optics=optics, chosen_focus=None)
         if lost and settings.focused_at is not None:
@@ -167,7 +170,10 @@ def restore_session(state: AppState, scene: Scene, settings: SavedSettings, lost
         return restored
     depth = DepthSettings(settings.source.depth.refine, settings.depth_edits)
     if (depth, settings.depth_strength) != (state.depth, state.depth_strength):
+        left = settings.optics_at(scene.width)
+        left = with_focus_of(left, Optics()) if has_other_depth else left
         restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
+        restored = replace(restored, restoring=(restored.optics, left))
         restored = replace(restored, generation=state.generation + 1)
     words = f"Restored as you left it, except for its depth: {lost}." if lost else RESTORED
     return notify(restored, Notice(words, commands=DEPTH_COMMANDS if lost else ()))
@@ -303,6 +309,17 @@ def _with_left_focus(state: AppState) -> AppState:
     optics = clamp_optics(optics, state.scene)
     models = replace(state.models, left_focus=None)
     return replace(state, optics=optics, chosen_focus=optics.focus_disparity, models=models)
+
+
+def _with_restored_optics(shown: AppState, before: AppState, scene: Scene) -> AppState:
+    """Return the state with the optics that the photo was left with, unless the user changed the lens meanwhile: they
+    belong to the plan of the depth that it was left with.
+    """
+    if before.restoring is None or before.optics != before.restoring[0]:
+        return shown
+    optics = clamp_optics(before.restoring[1], scene)
+    focus = None if shown.chosen_focus is None else optics.focus_disparity
+    return replace(shown, optics=optics, chosen_focus=focus)
 
 
 def _first_progress(state: AppState, scene: Scene) -> Progress:

@@ -1,6 +1,9 @@
-"""The next photo in a real window looks and behaves as if it were the first one: nothing of the photo before stays."""
+"""All that can be changed of a photo, in a real window: nothing of it stays for the next photo, undo takes it back,
+redo brings it again, and the photo opens again as it was left, after a crash, too.
+"""
 
 import os
+import shutil
 from dataclasses import fields, replace
 
 import numpy as np
@@ -11,8 +14,9 @@ from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import shows, write_scene
-from viewer.model import depth, inspection, lens, opening, selection, viewpoint, window
+from tests.viewer.conftest import rests, says, shows, write_scene
+from tests.viewer.model.told import words
+from viewer.model import depth, history, inspection, lens, opening, selection, viewpoint, window
 from viewer.model.action import do
 from viewer.model.depth import DepthSample
 from viewer.model.layout import Zoom
@@ -115,3 +119,52 @@ def test_the_next_photo_is_shown_as_if_it_were_the_first(open_window, tmp_path):
     assert state == expected
     for found, wanted in zip(pictures, seen(fresh), strict=True):
         assert np.abs(found - wanted).max() <= SAMPLING_LEVELS
+
+
+def edited(driver):
+    """Return what undo restores and a session keeps, in words: another plan and back rounds numbers."""
+    state = driver.app.state
+    return words((state.optics, state.depth, state.depth_strength))
+
+
+def at_rest(driver):
+    """Return the settings and the picture at rest, without an overlay."""
+    leave_picture(driver)
+    driver.settle(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
+    return edited(driver), driver.image().astype(int)
+
+
+def assert_alike(found, wanted):
+    assert found[0] == wanted[0]
+    assert np.abs(found[1] - wanted[1]).max() <= SAMPLING_LEVELS
+
+
+@pytest.mark.usefixtures("wide_window")
+def test_all_is_undone_done_again_and_there_again_after_a_crash(open_window, tmp_path, monkeypatch):
+    monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
+    (tmp_path / "photos").mkdir()
+    path, kept, crashed = next_photo(tmp_path / "photos"), tmp_path / "kept", tmp_path / "crashed"
+    driver = open_window(path, kept_in=kept).until_idle()
+    fresh = at_rest(driver)
+    assert not list(kept.rglob("sessions/*.json")), "nothing was changed yet"
+    everything(driver)
+    driver.do(do(viewpoint.set_loop, None), do(viewpoint.set_zoom, None), do(window.end_gesture))
+    left, focused_at = at_rest(driver), driver.app.state.focused_at
+    assert np.abs(left[1] - fresh[1]).max() > 2 * SAMPLING_LEVELS
+    driver.until(lambda app: bool(list(kept.rglob("sessions/*.json"))) and rests(app))
+    shutil.copytree(kept / "sessions", crashed / "sessions", ignore=shutil.ignore_patterns(".*"))
+    while driver.app.state.history.past:
+        driver.app.do(do(history.undo))
+    driver.until_idle()
+    assert_alike(at_rest(driver), fresh)
+    while driver.app.state.history.future:
+        driver.app.do(do(history.redo))
+    driver.until_idle()
+    assert_alike(at_rest(driver), left)
+    driver.close()
+    again = open_window(path, kept_in=crashed)
+    again.settle(says("as you left it"))
+    assert_alike(at_rest(again), left)
+    assert (again.app.state.focused_at, again.app.state.motion.kind) == (focused_at, None)
+    again.do(do(history.undo))
+    assert_alike(at_rest(again), fresh)

@@ -1,7 +1,6 @@
 """Photos open as they were left, in a real window, after the program was killed too."""
 
 import os
-import shutil
 from dataclasses import replace
 from threading import Event, current_thread, main_thread
 
@@ -17,7 +16,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import DEADLINE_S, rests, says
 from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
-from viewer.model import depth, history, lens, window
+from viewer.model import depth, lens, window
 from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
 from viewer.model.saving import SavedSettings
@@ -43,11 +42,6 @@ def change(driver):
     driver.until_idle()
 
 
-def left_with(driver):
-    state = driver.app.state
-    return state.optics, state.depth, state.depth_strength
-
-
 def is_restored(driver):
     return any(RESTORED in notice.text.lower() for notice in driver.app.state.notices)
 
@@ -59,24 +53,6 @@ def sessions_in(kept):
 def write_session(kept, photo_path, text):
     (kept / "sessions").mkdir(parents=True)
     (kept / "sessions" / f"{key_of(Source(str(photo_path), grid=ONE))}.json").write_text(text, "utf-8")
-
-
-def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window, photo_path, tmp_path):
-    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE).until_idle()
-    assert not sessions_in(tmp_path / "kept"), "the user did nothing yet"
-    change(first)
-    first.until(lambda app: bool(sessions_in(tmp_path / "kept")) and rests(app))
-    unfinished = shutil.ignore_patterns(".*")
-    shutil.copytree(tmp_path / "kept" / "sessions", tmp_path / "of the dead" / "sessions", ignore=unfinished)
-    left = left_with(first)
-    first.app.close()
-    second = open_window(photo_path, kept_in=tmp_path / "of the dead", grid=ONE)
-    second.settle(lambda app: is_restored(second))
-    assert left_with(second) == left
-    assert isinstance(second.app.state.depth.edits.strokes[0], Stroke)
-    assert second.app.scene_view.loaded.depth_settings == second.app.state.depth
-    second.do(do(history.undo))
-    assert second.app.state.depth.edits == UNEDITED
 
 
 def test_what_is_changed_while_the_session_is_looked_for_is_kept(open_window, photo_path, tmp_path, monkeypatch):

@@ -154,6 +154,9 @@ STORIES = {
     )),
     "sessions": (OPEN, (
         do(opening.restore_session, replace(LEFT, optics=replace(LEFT_OPTICS, dolly=math.nan))),
+        do(opening.restore_session, LEFT), END,
+        shown(**planned(0.75, 9.0, GridShape(6, 13), (-2.0, 4.0))), UNDO, shown(), do(opening.restore_session, LEFT),
+        END, do(lens.set_focus, 0.75), END, shown(**planned(0.75, 9.0)), UNDO, UNDO, shown(),
         do(opening.restore_session, LEFT),
         END, UNDO, do(opening.restore_session, replace(LEFT, depth_edits=DepthEdits())),
         do(opening.restore_session, replace(LEFT, depth_model="gone.onnx"), "gone.onnx: no such file"),
