@@ -73,9 +73,9 @@ def published(folder: Path) -> dict[str, bytes]:
     }
 
 
-def of_channels(file, last=False, as_bytes=False, extra="", rank=3, farness=False, size=112):
+def of_channels(file, last=False, as_bytes=False, extra="", rank=3, farness=False, size=112, channels=3):
     """A network that gives red, or, with `farness`, 300 less red. last: channels; as_bytes: uint8 input; rank: of the
-    depth; extra: name of an output before it that holds the input.
+    depth; extra: name of an output before it that holds the input; channels: their number, a name if the file has none.
     """
     axis = 3 if last else 1
     nodes = [
@@ -86,7 +86,7 @@ def of_channels(file, last=False, as_bytes=False, extra="", rank=3, farness=Fals
     ]
     nodes += [helper.make_node("Squeeze", ["whole", "axis"], ["depth"])] if rank == 3 else []
     nodes += [helper.make_node("Identity", ["floats"], [extra])] if extra else []
-    kind, shape = TensorProto.UINT8 if as_bytes else TensorProto.FLOAT, [1, size, size, 3] if last else [1, 3, "h", "w"]
+    shape = [1, size, size, 3] if last else [1, channels, "h", "w"]
     constants = {"red": [0], "axis": [axis], "most": np.float32(300)}
-    takes = helper.make_tensor_value_info("x", kind, shape)
+    takes = helper.make_tensor_value_info("x", TensorProto.UINT8 if as_bytes else TensorProto.FLOAT, shape)
     return save_graph(file, nodes, constants, takes, *([extra] if extra else []), "depth")

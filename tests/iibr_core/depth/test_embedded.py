@@ -123,6 +123,9 @@ def test_a_lost_part_is_reported() -> None:
         del parts[lost]
         with pytest.raises(InputError, match="cut short"):
             embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard, *parts]))
+    segments = [*files.gdepth_segments(PNG, part_bytes=150)[::-1], files.EXTENDED + b"short"]
+    whole = embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), segments))
+    assert whole.estimate.values.shape == SIZE, "in any order, beside a damaged one"
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from PIL import Image
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimate import OUTLIER_SPANS, DepthEstimate, Meaning, disparity_from
+from iibr_core.depth.search import open_with_depth
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.types import TOTAL_PARALLAX, FloatImage, GridShape, InputError, ViewOffset
 from tests.iibr_core.formats.test_view_files import leia_image
@@ -80,6 +82,11 @@ def test_a_pair_side_by_side_tells_the_disparity_from_eye_to_eye(tmp_path) -> No
     assert found[0].values.shape == (60, 80)
     assert np.median(np.abs(found[0].values - DISPARITY)) < 0.25  # a smooth wall, half a pixel a step
     Image.fromarray(eye(0)).save(path.with_name("a.png"))
+    Image.fromarray(eye(1)).save(path.with_name("b.png"))
+    for name, right, sign in (("a.png", "b.png", 1), ("b.png", "a.png", -1)):
+        found = open_with_depth(path.with_name(name), DepthChoice(right=str(path.with_name(right)), refine=False))
+        assert found.origin.line == "Depth: the photo's two views (stereo, two files)."
+        assert np.median(np.abs(found.disparity.values - sign * DISPARITY)) < 0.25
     path.with_name("a.lif").write_bytes(leia_image(eye(0), eye(1)).replace(b'"blob_id": -1', b'"blob_id": 10'))
     for other in ("a.png", "a.lif"):
         assert estimate_from_pair(path.with_name(other)) is None, "no pair, or another picture is shown"

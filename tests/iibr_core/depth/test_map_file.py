@@ -31,6 +31,8 @@ from tests.iibr_core.depth.drawn_photo import (
     unit,
     usual_disparity,
 )
+from tests.iibr_core.depth.test_sheets import assert_sheet
+from tests.iibr_core.formats.test_color_profile import profile_bytes
 
 Write = Callable[[Path, FloatImage], object]
 CORNER = np.s_[40:44, 100:110]
@@ -60,6 +62,17 @@ def metres(near: FloatImage) -> FloatImage:
 
 def rotated(stored: np.ndarray) -> np.ndarray:
     return ((stored << 3) | (stored >> 13)).astype(np.uint16)
+
+
+def sky_of_65535(path: Path, near: FloatImage) -> None:
+    save(path, np.where(near > 0, 1000 / np.maximum(near, 0.05), 65535).astype(np.uint16))
+
+
+def low_and_zero(near: FloatImage) -> np.ndarray:
+    """Zeros are no holes here: other values begin just above them."""
+    stored = (3 + 252 * unit(near)).astype(np.uint8)
+    stored[HOLES] = 0
+    return stored
 
 
 def scattered_zeros(near: FloatImage) -> np.ndarray:
@@ -100,7 +113,7 @@ class Row(NamedTuple):
     """map: name of its file, found by its name if that begins with that of the photo. write: it.
 
     choice: of the user. expected: disparity, None for that of relative depth. metres: 1 / m, if that is known.
-    scene: photo and inverse distances. opened: options of `open_with_depth`.
+    scene: photo and inverse distances. opened: options of `open_with_depth`; saved: of writing the photo.
     """
 
     map: str
@@ -112,6 +125,7 @@ class Row(NamedTuple):
     orientation: int = 1
     atol: float = LOSSY
     opened: Mapping[str, Any] = NOTHING
+    saved: Mapping[str, Any] = NOTHING
 
 
 INVERTS, METRIC = {"inverts": True}, {"is_metric": True}
@@ -126,6 +140,8 @@ ROWS = {
     "8 bits, stretched": Row(
         "map.png", lambda p, n: save(p, cv2.resize(spread(n), (112, 112))), {"stretches": True}, atol=0.06
     ),
+    "8 bits that begin above 0": Row("map.png", lambda p, n: save(p, low_and_zero(n)), atol=np.inf),
+    "a photo in Display P3": Row("map.png", integers(), saved={"icc_profile": profile_bytes()}),
     "jpeg": Row("map.jpg", in_mode("RGB"), atol=0.1),
     "webp": Row("map.webp", in_mode("RGB"), atol=0.06),
     "rgba": Row("map.png", in_mode("RGBA")),
@@ -149,6 +165,10 @@ ROWS = {
     "metres of half the size": Row("photo_depth.npy", array(lambda n: metres(n)[::2, ::2]), metres=same, atol=0.1),
     "metres, inverted": Row(
         "photo_depth.npy", array(lambda n: metres(n)), INVERTS, lambda n: usual_disparity(1 / n), atol=0.1
+    ),
+    "millimetres, the sky is 65535": Row("photo_depth.png", sky_of_65535, metres=same, atol=0.1, scene=drawn(True)),
+    "millimetres without a name": Row(
+        "map.npy", lambda p, n: np.save(p, (1000 / n).astype(np.uint16)), metres=same, scene=slope(), atol=np.inf
     ),
     "metres as said": Row("map.tif", lambda p, n: Image.fromarray(metres(n)).save(p), METRIC, metres=same, atol=0.1),
     "millimetres": Row(
@@ -182,7 +202,7 @@ ROWS = {
 
 def open_row(folder: Path, row: Row):
     photo, near = row.scene
-    path = save(folder / "photo.png", stored_as(photo, row.orientation), row.orientation)
+    path = save(folder / "photo.png", stored_as(photo, row.orientation), row.orientation, **row.saved)
     row.write(folder / row.map, near)
     file = None if row.map.startswith("photo") else str(folder / row.map)
     choice = DepthChoice(**({"file": file, "refine": False} | row.choice))
@@ -263,3 +283,24 @@ def test_maps_that_cannot_serve_are_refused_with_the_way_out(tmp_path) -> None:
     hues = np.dstack([grey, *[np.full_like(grey, 255)] * 2])
     with pytest.raises(InputError, match=r"circle of hues .*; save it as grey"):
         open_row(tmp_path, Row("hsv.png", lambda path, _: Image.fromarray(hues, "HSV").convert("RGB").save(path)))
+
+
+SOFT = cv2.GaussianBlur(drawn()[1], (0, 0), 2.0)
+REFINED: dict[str, tuple[Write, int]] = {
+    "soft, half as large": (lambda path, _: save(path, as_bytes(SOFT)[::2, ::2]), 1),
+    "soft": (lambda path, _: np.save(path, SOFT), 6),
+    "grown, with holes": (
+        lambda path, near: np.save(path, np.where(HOLES, np.nan, cv2.dilate(near, np.ones((7, 7), np.uint8)))), 1
+    ),
+    "a coarse jpeg": (lambda path, near: save(path, as_bytes(near)[::4, ::4], quality=60), 8),
+}  # fmt: skip
+
+
+def test_opened_maps_are_drawn_to_the_photos_edges(tmp_path, regenerate_golden) -> None:
+    maps = []
+    for name, (write, orientation) in REFINED.items():
+        file = "map.npy" if name in ("soft", "grown, with holes") else "map.jpg" if "jpeg" in name else "map.png"
+        found = open_row(tmp_path, Row(file, write, {"refine": True}, orientation=orientation))
+        assert_as_kept(found, tmp_path, "beside", name, regenerate_golden)
+        maps.append(unit(found.disparity.values)[::2, ::2])
+    assert_sheet("opened", maps, (0, 1), 2, regenerate_golden, tmp_path)

@@ -1,11 +1,14 @@
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.models import catalog
+from iibr_core.depth.estimate import DepthEstimate
+from iibr_core.depth.models import cache, catalog
 from iibr_core.depth.models.download import local_folder
 from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.runtime.work import Cancelled, stoppable
@@ -51,6 +54,40 @@ def test_a_folder_with_several_files_asks_which(tmp_path) -> None:
         (tmp_path / "config.json").write_text(json.dumps({"model_type": kind}))
         found = catalog.model_to_use(DepthChoice(model=str(tmp_path)))
         assert (found.runner, found.weights) == (runner, (weights,)), "only ZoeDepth's weights say that it gives metres"
+
+
+def test_a_model_is_named_by_its_file_or_its_folder_and_others_are_refused(tmp_path) -> None:
+    (tmp_path / "halls" / "onnx").mkdir(parents=True)
+    assert catalog.register(weighing(tmp_path / "halls" / "onnx" / "model.onnx", (1, 0, 0))).name == "halls"
+    assert catalog.register(weighing(tmp_path / "rooms.onnx", (0, 1, 0))).name == "rooms"
+    assert list(catalog.list_own_models()) == ["halls", "rooms"]
+    (tmp_path / "notes.txt").touch()
+    for wanted, message in (
+        (str(tmp_path / "gone"), "no such file or folder"),
+        ("gone.onnx", "no such file or folder"),
+        (str(tmp_path / "notes.txt"), "is not an ONNX file"),
+        ("gone", f"no depth model of this name is known; there are {USUAL_MODEL}, .*zoedepth.*, halls, rooms$"),
+    ):
+        with pytest.raises(InputError, match=message):
+            catalog.model_to_use(DepthChoice(model=wanted))
+
+
+def test_the_estimates_that_were_used_last_are_kept(monkeypatch) -> None:
+    values = np.arange(600, dtype=np.float32).reshape(20, 30)
+    monkeypatch.setattr(cache, "MAX_BYTES", 3 * (values.nbytes + 600))
+    for at, key in enumerate("abc"):
+        cache.store(key, DepthEstimate(values + at, "metres", 1.5))
+        os.utime(cache.cache_folder() / f"{key}.npz", (at, at))
+    found = cache.load("a")
+    assert (found.meaning, found.focal_ratio, found.values[0, 1]) == ("metres", 1.5, 1.0)
+    cache.store("d", DepthEstimate(values, "inverse depth"))
+    assert [cache.load(key) is not None for key in "abcd"] == [True, False, True, True], "a was looked up since"
+    assert cache.load("d").focal_ratio is None
+    monkeypatch.setattr(cache, "MAX_BYTES", 10)
+    cache.store("large", DepthEstimate(values, "disparity"))
+    assert [cache.load(key) is not None for key in ("a", "c", "large")] == [False, False, True], "the newest stays"
+    (cache.cache_folder() / "large.npz").write_bytes(b"damaged")
+    assert cache.load("large") is None
 
 
 def test_a_copied_model_brings_its_numbers_and_settings_along(tmp_path) -> None:

@@ -66,7 +66,15 @@ def test_the_input_has_the_photos_aspect_in_multiples_of_14(height, width) -> No
 
 
 @pytest.mark.parametrize(
-    "layout", [{"last": True}, {"as_bytes": True}, {"last": True, "as_bytes": True}, {"extra": "feature"}, {"rank": 4}]
+    "layout",
+    [
+        {"last": True},
+        {"as_bytes": True},
+        {"last": True, "as_bytes": True},
+        {"extra": "feature"},
+        {"rank": 4},
+        {"channels": "c"},
+    ],
 )
 def test_other_layouts_are_read_alike(tmp_path, layout) -> None:
     photo = photo_of(112, 112)

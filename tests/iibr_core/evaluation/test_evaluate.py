@@ -13,16 +13,18 @@ from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options, Result, evaluate
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.report import figures_table, summary_table, write_report
-from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL
+from iibr_core.evaluation.report import write_report
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.types import ViewOffset
+from tests.golden_text import FOLDER as GOLDEN
+from tests.golden_text import assert_same_text
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
-from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of
+from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of, turned_cameras
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid
 from tests.iibr_core.lens_scenes import FOLDER
+from tests.image_compare import DECISIONS, assert_close, read_png, write_png
 
 WAYS = ["unchanged photo", "one plane", "plain warp, true map", "iibr, true map"]
 REPORT = ["index.html", "report.json", "report.md"]
@@ -42,18 +44,6 @@ def results(folder) -> list[Result]:
     return evaluate(scene_of(folder), Options(choice=UNREFINED))
 
 
-def test_both_trials_have_every_row(results) -> None:
-    centre, corner = results
-    assert [result.trial for result in results] == [CENTRE_TRIAL, CORNER_TRIAL]
-    for result in results:
-        assert [row.name for row in result.rows] == WAYS
-        assert result.size == (HEIGHT, WIDTH)
-    assert centre.given == "v01 u01"
-    assert set(centre.rows[0].views) == {f"v{v:02d} u{u:02d}" for v in range(3) for u in range(3)} - {"v01 u01"}
-    assert (corner.given, list(corner.rows[0].views)) == ("v02 u00", ["v00 u00"])
-    assert any("carried over" in note for note in corner.notes)
-
-
 def test_figures_are_those_of_the_files(folder, results) -> None:
     photo = read_photo(folder / "views/v01_u01.png").pixels
     truth = read_photo(folder / "views/v00_u02.png").pixels
@@ -67,17 +57,6 @@ def test_figures_are_those_of_the_files(folder, results) -> None:
         assert figures.ssim == pytest.approx(ssim(image, truth))
         assert figures.flip == pytest.approx(flip(image, truth))
         assert math.isnan(figures.lpips)
-
-
-def test_an_estimate_is_compared_at_its_own_and_the_best_scale_in_smaller_pictures(folder) -> None:
-    choice, max_pixels = DepthChoice(start="rough", refine=False), HEIGHT * WIDTH // 4
-    result = evaluate(scene_of(folder), Options("estimate", choice, views=2, max_pixels=max_pixels))[0]
-    assert result.size == (HEIGHT // 2, WIDTH // 2)
-    found = full_db(result)
-    kinds = ("guess", "guess, fitted", "true map")
-    assert list(found) == WAYS[:2] + [f"{way}, {kind}" for kind in kinds for way in ("plain warp", "iibr")]
-    assert found["iibr, true map"] > found["unchanged photo"] + 5
-    assert found["plain warp, guess"] <= found["plain warp, guess, fitted"] < found["plain warp, true map"]
 
 
 def test_nan_in_a_true_view_and_in_the_map_give_finite_figures(tmp_path) -> None:
@@ -95,21 +74,43 @@ def test_nan_in_a_true_view_and_in_the_map_give_finite_figures(tmp_path) -> None
         assert all(np.isfinite([of.full_db, of.ssim, of.flip]).all() for of in row.views.values())
 
 
-def test_refocus_and_lpips_of_a_rendered_scene(networks) -> None:  # noqa: F811
-    options = Options(choice=UNREFINED, lpips=networks, views=10, max_pixels=10_000)
-    result = evaluate(scene_of(FOLDER / "fence"), options)[0]
-    photo, *_, ours = result.rows
+@pytest.fixture(scope="module")
+def all_results(folder, results, networks, tmp_path_factory) -> list[Result]:  # noqa: F811
+    """Both trials of the square; an estimate for it in smaller pictures; a rendered scene, refined; turned cameras."""
+    rough, small = DepthChoice(start="rough", refine=False), HEIGHT * WIDTH // 4
+    fence = Options(lpips=networks, views=10, max_pixels=10_000)
+    return [
+        *results,
+        *evaluate(scene_of(folder), Options("estimate", rough, views=2, max_pixels=small)),
+        *evaluate(scene_of(FOLDER / "fence"), fence),
+        *evaluate(*turned_cameras(tmp_path_factory.mktemp("turned"))),
+    ]
+
+
+def test_the_report_is_what_it_was_and_its_order_is_plausible(all_results, regenerate_golden, tmp_path) -> None:
+    write_report(tmp_path, all_results, "iibr <evaluate>")
+    lines = (tmp_path / "report.md").read_text().splitlines()
+    assert_same_text(lines, "evaluation/report", "all trials", regenerate_golden, rtol=0.02)
+    pictures = [picture for shown in all_results[0].pictures.values() for picture in shown.values()]
+    sizes = [max(picture.shape[axis] for picture in pictures) for axis in (0, 1)]
+    padded = [np.pad(p, ((0, sizes[0] - p.shape[0]), (0, sizes[1] - p.shape[1]), (0, 0))) for p in pictures]
+    count = len(WAYS) + 1
+    sheet = np.vstack([np.hstack(padded[k : k + count]) for k in range(0, len(padded), count)])
+    path = GOLDEN / "evaluation" / "pictures.png"
+    if regenerate_golden:
+        write_png(path, sheet)
+    assert_close(sheet, read_png(path), DECISIONS, tmp_path, "pictures")
+    photo, *_, ours = all_results[4].rows
     assert list(ours.refocus_db) == ["near", "middle", "far"]
     assert all(ours.refocus_db[name] > photo.refocus_db[name] + 3 for name in ours.refocus_db)
     assert 0 < ours.mean.lpips < photo.mean.lpips
-    assert {"LPIPS", "near focus dB", "consistency"} <= set(figures_table(result).head)
-
-
-def test_several_scenes_have_a_mean_of_their_centre_trials(results) -> None:
-    centre, corner = results
-    *_, row = summary_table([centre, corner, centre]).rows
-    assert row[:2] == ("mean of 2 scenes", CENTRE_TRIAL)
-    assert row[3:] == summary_table([centre]).rows[0][3:]
+    found = full_db(all_results[2])
+    assert found["iibr, true map"] > found["unchanged photo"] + 5
+    assert found["plain warp, guess"] <= found["plain warp, guess, fitted"] < found["plain warp, true map"]
+    turned = {row.name: row.mean for row in all_results[-1].rows}
+    assert turned["unchanged photo"].full_db < 25 < 35 < turned["iibr, given map"].visible_db
+    assert turned["plain warp, given map"].visible_db > 35
+    assert turned["one plane"].full_db > 30
 
 
 def test_a_report_holds_every_figure_and_needs_no_other_file(results, tmp_path) -> None:
