@@ -17,7 +17,6 @@ from iibr_core.method.plan import plan_literal
 from iibr_core.types import Disparity, GridShape, InputError, Photo
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import generate, square_before_wall
-from tests.iibr_core.unequal_rows import SQUARE_PX, write_unequal_rows
 
 PAGE = Path(__file__).parents[3] / "docs" / "python.md"
 README = Path(__file__).parents[3] / "README.md"
@@ -151,12 +150,6 @@ def test_saved_fields_open_again_and_are_refocused_from_their_stored_views(forma
     for options in ({"parallax": "literal"}, {"depth_strength": 2.0}):
         with pytest.raises(InputError, match="are for photos"):
             scene.light_field(**options)
-
-
-def test_fields_of_uneven_rows_are_refocused_by_their_positions(tmp_path) -> None:
-    field = iibr.open(write_unequal_rows(tmp_path / "field")).light_field()
-    square = np.s_[36:60, 36:60]
-    assert iibr.compare(field.refocus(SQUARE_PX, 4.0)[square], field.view(0, 0)[square]).psnr_db > 35
 
 
 def test_views_come_once_the_middle_one_first() -> None:

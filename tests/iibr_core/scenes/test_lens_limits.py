@@ -11,21 +11,17 @@ from iibr_core.scenes.lens_limits import (
     clamp_optics,
     clamp_to_grid,
     eye_limits,
-    first_aperture,
     focus_limits,
     is_finite,
 )
-from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import (
     Scene,
-    SceneReady,
-    SceneRequest,
     Source,
     source_beside,
     source_with_depth,
     source_with_map,
 )
-from iibr_core.types import CENTRE, GridShape, ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 
 RANGES = [(-1.0, 2.0), (1.0, 4.0), (-3.0, -1.0), (2.0, -1.0), (-1.0, -3.0), (0.0, 2.0), (-2.0, 0.0), (0.0, 0.0)]
 SCENE = Scene(Source("a.png"), "a", 96, 64, GridShape(5, 9), (-1.0, 2.0), "file")
@@ -41,17 +37,6 @@ def test_the_focus_goes_from_beyond_one_end_over_the_static_plane_to_the_other(r
     for focus in (*range_px, 0.0):
         assert clamp_optics(Optics(focus_disparity=focus), scene).focus_disparity == focus
         assert LensChoice(focus=focus).optics_on(scene).focus_disparity == focus
-
-
-@pytest.mark.parametrize(("strength", "static"), [(1.0, None), (-1.0, -4.0), (1.0, 5.0)])
-def test_a_photo_whose_static_plane_lies_anywhere_may_be_focused_on_it(photo_path, static, strength) -> None:
-    source = Source(str(photo_path), grid=GridShape(3, 3), focus_disparity=static)
-    ready = next(results_of(SceneRequest(1, source, strength), lambda: CENTRE))
-    assert isinstance(ready, SceneReady)
-    low, high = focus_limits(ready.scene)
-    least, most = ready.scene.disparity_range_px
-    assert low < min(least, 0.0) <= max(most, 0.0) < high
-    assert (least <= 0 <= most) == (static is None)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -82,14 +67,6 @@ def test_the_viewpoint_leaves_a_single_view_only() -> None:
     assert clamp_optics(Optics(aperture_diameter=3.0), single).aperture_diameter == 0
     assert clamp_to_grid(ViewOffset(0.4, -0.4), GridShape(1, 4)) == (0, -0.4)
     assert clamp_to_grid(ViewOffset(9, 9), GridShape(3, 4)) == (1, 1)
-
-
-def test_focusing_opens_a_pinhole_and_other_choices_stay() -> None:
-    assert LensChoice().optics_on(SCENE) == Optics()
-    focused = LensChoice(focus=1.0).optics_on(SCENE)
-    assert (focused.focus_disparity, focused.aperture_diameter) == (1.0, first_aperture(SCENE))
-    chosen = LensChoice(ViewOffset(1.0, -2.0), 1.0, 0.5).optics_on(SCENE)
-    assert (chosen.eye, chosen.aperture_diameter) == ((1.0, -2.0), 0.5)
 
 
 @pytest.mark.parametrize(

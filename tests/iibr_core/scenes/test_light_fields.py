@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
@@ -82,15 +81,6 @@ def test_a_field_that_does_not_fit_is_thinned(tmp_path, monkeypatch, is_asked) -
     assert ready.scene.infinity_px == pytest.approx(-2.0, abs=0.01)
     found = {(result.view.row, result.view.column): result.view.disparity[8, 8] for result in views}
     assert found == pytest.approx({(v, u): 2 * (2 * v + 2 * u / 8) for v, u in np.ndindex(3, 3)}, abs=0.01)
-
-
-def test_the_centre_views_disparity_may_be_given(tmp_path) -> None:
-    folder, given = write_two_planes(tmp_path / "field"), tmp_path / "given.npy"
-    np.save(given, np.full((HEIGHT, WIDTH), 0.25, np.float32))
-    request = SceneRequest(1, Source(str(folder), DepthChoice(file=str(given), file_scale=2.0)), takes_drafts=False)
-    ((ready, views),) = showings(results_of(request, lambda: CENTRE))
-    assert (ready.scene.depth_source, ready.scene.disparity_range_px) == ("given.npy", (0.5, 0.5))
-    assert all(view.view.disparity is not None and (view.view.disparity == 0.5).all() for view in views)
 
 
 def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path) -> None:

@@ -7,7 +7,7 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
-from iibr_core.formats.images.photo import focal_px_from_fov, read_photo
+from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.images.write import write_image
 from iibr_core.gloss.settings import Gloss, GlossSurface
 from iibr_core.method.plan import MAX_DEPTH_STRENGTH
@@ -91,33 +91,6 @@ def test_progress_counts_every_view_once(photo_path) -> None:
     assert 0 < progress[0].seconds <= progress[-1].seconds < 600
     few = list(results_of(request, lambda: CENTRE, lambda: [ViewOffset(1.0, 1.0)]))[1:]
     assert [(view.view.row, view.view.column, view.progress.total) for view in few] == [(1, 1, 2), (2, 2, 2)]
-
-
-def test_a_photo_states_its_focal_length_only_where_it_is_known_and_its_size_upright(tmp_path) -> None:
-    path = tmp_path / "a.jpg"
-    exif = Image.Exif()
-    exif[0x0112] = 6  # stored lying on its side
-    Image.new("RGB", (80, 60)).save(path, exif=exif)
-    scene = opened(Source(str(path))).scene
-    assert (scene.size, scene.own_size, scene.focal_px) == ((60, 80), (60, 80), None)
-    known = tmp_path / "known.png"
-    write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
-    assert opened(Source(str(known))).scene.focal_px == read_photo(known).focal_px
-    assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
-
-
-def test_a_scene_states_its_range_its_infinity_and_its_subject() -> None:
-    photo, disparity = square_before_wall()  # 2 before 0, the square in the middle
-    loaded = photo_of_arrays(photo, replace(disparity, inverse_metres=(0.5, 0.25)))
-    source = Source("", grid=GRID, focus_disparity=0.5)
-    plan = make_plan(source, loaded, 1.0)
-    scene, scale = scene_of_photo(source, loaded, plan), plan.disparity_scale
-    assert scale > 0
-    assert scene.disparity_range_px == pytest.approx((-0.5 * scale, 1.5 * scale))
-    assert scene.infinity_px == pytest.approx((-0.5 - 0.5) * scale)
-    assert scene.found_span_px == pytest.approx(2 * scale)
-    assert scene.subject_disparity_px == pytest.approx(1.5 * scale)
-    assert (scene.inverse_metres, scene.own_size, scene.focal_px) == ((0.5, 0.25), (80, 60), 100)
 
 
 @pytest.mark.parametrize("static", [None, 0.5])
