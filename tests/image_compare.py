@@ -34,6 +34,9 @@ DECISIONS = Tolerance(2, 0.002, 255)
 DEPTH_EDGES = Tolerance(2, 0.004, 255)
 """The same for hard scenes, where a pixel beside an edge may show the surface before or behind it."""
 
+OTHER_PROCESSOR = Tolerance(1, 0.001, 40)
+"""Golden pictures of the core: another processor rounds differently, which may turn a decision here and there."""
+
 
 def problem_with(image: NDArray[np.uint8], expected: NDArray[np.uint8], tolerance: Tolerance) -> str | None:
     """What is wrong with an (H, W, 3) image, or None."""
