@@ -34,7 +34,7 @@ DECISIONS = Tolerance(2, 0.002, 255)
 DEPTH_EDGES = Tolerance(2, 0.004, 255)
 """The same for hard scenes, where a pixel beside an edge may show the surface before or behind it."""
 
-OTHER_PROCESSOR = Tolerance(1, 0.001, 40)
+OTHER_PROCESSOR = Tolerance(1, 0.0008, 255)
 """Golden pictures of the core: another processor rounds differently, which may turn a decision here and there."""
 
 

@@ -16,9 +16,6 @@ from iibr_core.beyond.free_cameras import FreeViews, fitted_cameras, inverse_dep
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile
 from iibr_core.beyond.hidden_surfaces import SeenBehind, hidden_surface
 from iibr_core.color import convert
-from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.inpainting.outpainting import outpaint
 from iibr_core.method.light_field import ViewMaker
 from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.ray_transformer import shipped_transformer
@@ -27,7 +24,7 @@ from iibr_core.stages import ALL_STAGES
 from iibr_core.training.degradation import degrade
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import DISPLAY_P3, SRGB, Camera, GridShape, ImageSize, Margins, ViewOffset, ViewUpdate
+from iibr_core.types import DISPLAY_P3, SRGB, Camera, GridShape, ImageSize, ViewOffset, ViewUpdate
 from tests.iibr_core.hard_scene import GRID, HEIGHT, WIDTH, assert_golden, grey, hard_field, hard_scene, with_maps
 
 CORNERS = [ViewOffset(-2.0, -2.0), ViewOffset(1.0, 2.0)]
@@ -133,16 +130,6 @@ def behind_the_photo():
     return [with_maps(each.colors, each.disparity, ~each.mask) for each in surfaces]
 
 
-def filled_maps():
-    """Return maps whose unknown pixels are filled by colour and from the background, and a photo beyond its frame."""
-    photo, disparity = hard_scene()
-    given = np.where(np.random.default_rng(2).random(disparity.shape) < 0.2, np.float32(np.nan), disparity)
-    given[10:33, 26:34] = given[44:, 20:30] = given[:9, 49:] = given[20:30, 60:66] = np.nan
-    filled = fill_disparity_by_color(photo, given), fill_disparity_holes(given)
-    larger = outpaint(photo, disparity, Margins(7, 10, 5, 12))
-    return [np.concatenate([*map(grey, filled)], 1), np.concatenate([larger[0], grey(larger[1])], 1)]
-
-
 def scenes_for_training():
     size, pictures = ImageSize(48, 64), []
     for seed, offset in ((3, ViewOffset(-1.5, 2.0)), (12, ViewOffset(3.0, 0.4)), (29, ViewOffset(0.0, -2.5))):
@@ -167,7 +154,6 @@ PICTURES = {
     "free-cameras-hdr": partial(of_free_cameras, True, inpainter=None),
     "tiles": tiles_of_a_large_photo,
     "behind-the-photo": behind_the_photo,
-    "filled-maps": filled_maps,
     "scenes-for-training": scenes_for_training,
 }  # fmt: skip
 
