@@ -18,7 +18,7 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.flying_pixels import without_flying_pixels
 from iibr_core.method.look_up import look_up
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
-from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.rays import RaysBehind, rays_of_photo
 from iibr_core.method.steep_surfaces import join_steep_rays
 from iibr_core.stages import ALL_STAGES
 from iibr_core.types import Margins, ViewOffset
@@ -32,10 +32,13 @@ def side_by_side(*pictures):
 
 
 def holes():
-    """Return filled holes: wide and thin ones, at the border, across surfaces; ordinary, and without texture."""
-    photo, disparity = hard_scene()
+    """Return filled holes: wide and thin ones, at the border, across surfaces; ordinary, and without texture.
+
+    They cross the borders of blocks. Where nothing is known, nothing is written.
+    """
+    photo, disparity = hard_scene(size=(91, 125))
     hole = np.random.default_rng(3).random(disparity.shape) < 0.03
-    hole[8:30, 24:33] = hole[36:, 40:66] = hole[:7, 50:] = hole[20:28, 70:] = hole[40:50, :9] = True
+    hole[12:45, 36:49] = hole[54:, 57:99] = hole[:10, 75:] = hole[30:42, 105:] = hole[58:75, :13] = True
     pictures = []
     for hides, at, threads, stages in (
         (np.roll(disparity, (3, -4), (0, 1)), OFFSET, 2, ALL_STAGES),
@@ -44,6 +47,9 @@ def holes():
         colors, values = photo.copy(), disparity.copy()
         colors[hole] = values[hole] = 0
         fill_background(colors, values, hole, hides, at, threads, stages, farthest_views=None if any(at) else 3.0)
+        nothing = np.zeros_like(photo), np.zeros_like(disparity)
+        fill_background(*nothing, np.ones_like(hole), hides, at, stages=stages, farthest_views=1.0)
+        assert not np.any(nothing[0])
         pictures.append(with_maps(colors, values, hole))
     in_front = continues_in_front(np.where(hole, np.float32(0.5), disparity), hole, np.roll(disparity, 5, 1), OFFSET)
     return [*pictures, grey(in_front, 0, 1)]
@@ -82,8 +88,10 @@ def landings():
     """Return what lands on a view: sums of coverage, nearest and heaviest surfaces, joined rays, cells and colours."""
     photo, disparity = hard_scene()
     rays, pictures = rays_of_photo(photo, disparity, 2.5, 1), []
-    behind = np.random.default_rng(2).random(disparity.shape) < 0.5
-    rays.add(ViewOffset(-2.0, 1.0), 1 - photo, disparity - 1, behind)
+    filled = np.random.default_rng(2).random(disparity.shape) < 0.5
+    pixel = np.flatnonzero(np.random.default_rng(3).random(disparity.shape) < 0.1)
+    behind = RaysBehind(pixel, photo.reshape(-1, 3)[pixel], disparity.reshape(-1)[pixel] - 3)
+    rays.add(ViewOffset(-2.0, 1.0), 1 - photo, disparity - 1, filled, behind)
     for offset in (ViewOffset(2.3, -1.7), ViewOffset(-0.4, 0.9)):
         found = find_candidates(rays, offset, (5, 61), (3, 80))
         weights, share = closed_form(found)

@@ -87,13 +87,6 @@ def test_the_centre_comes_first_given_or_not_and_every_view_once(sparse, dense):
     assert sorted(places) == list(np.ndindex(dense))
 
 
-def test_hdr_views_stay_hdr():
-    given = [ViewUpdate(0, u, np.full((12, 16, 3), 4.0, np.float16), np.zeros((12, 16), np.float32)) for u in (0, 1)]
-    middle = by_index(list(densify(given, GridShape(1, 2), GridShape(1, 3))))[0, 1]
-    assert middle.colors.dtype == np.float16
-    assert np.abs(middle.colors - 4.0).max() < 0.01
-
-
 @pytest.mark.parametrize(
     ("sparse", "dense", "advice"),
     [((3, 3), (8, 8), "5x5, 7x7, 9x9"), ((3, 3), (3, 3), "5x5"), ((3, 3), (2, 2), "5x5"), ((3, 3), (9, 5), "9x9"),

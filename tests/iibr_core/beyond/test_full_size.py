@@ -4,11 +4,10 @@ from scipy import ndimage
 
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.formats.images.resized_light import mean_of_areas
-from iibr_core.method.light_field import view_maker
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer, finish
-from iibr_core.types import ImageSize, Photo, ViewOffset
-from tests.iibr_core.scenes import literal_plan, square_before_wall
+from iibr_core.types import ImageSize, ViewOffset
+from tests.iibr_core.scenes import square_before_wall
 
 OFFSET = ViewOffset(0.6, -1.5)
 
@@ -39,28 +38,6 @@ def test_a_view_in_tiles_is_the_view_made_at_once(side) -> None:
     known = ~ndimage.binary_dilation(expected.occluded, np.ones((3, 3)))
     assert known.mean() > 0.85
     assert np.abs(seen - expected.colors)[known].max() < 0.02
-
-
-def test_holes_show_what_the_smaller_light_field_shows() -> None:
-    photo, disparity = square_before_wall(48, 60, foreground=1.5)
-    red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
-    plan = literal_plan(photo, disparity, 3)
-    maker = view_maker(photo, disparity, plan)
-    rays, renderer = maker.rays, Renderer()
-    # Every inpainted ray is made red: so the larger photo's holes are.
-    rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
-    large_photo = LargePhoto(*(np.repeat(np.repeat(a, 2, 0), 2, 1) for a in (photo.pixels, 2 * disparity.values)), rays)
-    offset = ViewOffset(-1.0, -1.0)
-    (view,) = views_of_tile(large_photo, whole(large_photo.size), [offset], renderer)
-    hole = maker.view(offset).occluded
-    assert hole.sum() > 20
-    shown = view.colors[::2, ::2][hole]
-    assert (np.abs(shown - red.pixels[0, 0]).max(axis=1) < 0.05).mean() > 0.8
-    rays.arrays.colors[rays.photo_images : len(rays)] = np.linspace(0, 59, 60)[:, None]
-    enlarged = large_photo.rays(whole(large_photo.size), [offset], 1.0)
-    *_, column = np.nonzero(added := enlarged.arrays.coverage[enlarged.photo_images : len(enlarged)] > 0)
-    places = enlarged.arrays.colors[enlarged.photo_images : len(enlarged)][added][:, 0]
-    assert np.median(places - ((column + 0.5) / 2 - 0.5)) == pytest.approx(0, abs=0.01), "areas of pixels coincide"
 
 
 def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:

@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights, views_in_aperture
@@ -46,28 +45,6 @@ def test_a_camera_is_sheared_to_the_focus(tilt) -> None:
     optics, view = Optics(EYE, focus_disparity=1.3, focus_tilt=tilt), smooth_texture(*SIZE)
     expected = sheared(view, focus_of(optics), (CAMERA.t - EYE.t, CAMERA.s - EYE.s))
     np.testing.assert_allclose(light_of(optics, (CAMERA, view))[INSIDE], expected[INSIDE], atol=0.01)
-
-
-def test_within_the_focus_range_content_stays_where_the_eye_sees_it() -> None:
-    """A wall at 2: its disparity is within the range, though not the focus; beyond it, it moves by the rest."""
-    view, wall = smooth_texture(*SIZE), np.full(SIZE, 2.0, np.float32)
-    optics = Optics(focus_disparity=1.0, focus_range=1.5)
-    moved = sheared(view, wall, CAMERA)
-    np.testing.assert_allclose(light_of(optics, (CAMERA, view), disparity=wall)[INSIDE], moved[INSIDE], atol=0.01)
-    nearer = replace(optics, focus_range=0.4)
-    expected = sheared(view, np.full(SIZE, 1.4, np.float32), CAMERA)
-    np.testing.assert_allclose(light_of(nearer, (CAMERA, view), disparity=wall)[INSIDE], expected[INSIDE], atol=0.01)
-
-
-@pytest.mark.parametrize("ratio", [-1.0, -0.5, 2.0])
-def test_what_is_within_the_range_stays_so_where_all_disparities_are_scaled(ratio) -> None:
-    """Also where depth is turned inside out."""
-    view, wall = smooth_texture(*SIZE), np.full(SIZE, 1.2 * ratio, np.float32)
-    optics = Optics(focus_disparity=0.5, focus_range=1.0, focus_tilt=(0.2, -0.1)).with_focus_scaled(ratio)
-    assert optics.focus_tilt == (0.2 * ratio, -0.1 * ratio)
-    optics = replace(optics, focus_tilt=(0.0, 0.0))
-    moved = sheared(view, wall, CAMERA)
-    np.testing.assert_allclose(light_of(optics, (CAMERA, view), disparity=wall)[INSIDE], moved[INSIDE], atol=0.01)
 
 
 def test_light_above_white_counts_as_it_is_and_recovery_adds_none():
@@ -138,11 +115,6 @@ def test_cameras_have_centre_and_width_of_the_opening(case, diameter, count) -> 
     assert np.mean((points - points.mean(0)) ** 2) == pytest.approx(radius**2 * moment, rel=0.02)
 
 
-def test_blades_turn_to_the_right() -> None:
-    corners = aperture_points(ApertureShape("polygon", blades=3, rotation_deg=30.0), 2.0, UNLIMITED, 256)
-    assert (corners[:, 1].min(), corners[:, 1].max()) == pytest.approx((-1, 0.5), abs=0.12)
-
-
 def test_an_empty_mask_is_a_pinhole_in_the_middle() -> None:
     closed = ApertureShape("mask", mask=ApertureMask("closed", 2, 2, bytes(4)))
     assert np.array_equal(aperture_points(closed, 3.0, UNLIMITED, 20), np.zeros((1, 2)))
@@ -154,21 +126,6 @@ def test_an_aperture_beyond_the_grid_is_the_grids_square(diameter) -> None:
     points = aperture_points(DISC, diameter, 5.0, 64)
     assert np.mean(points**2) == pytest.approx(5**2 / 12, rel=0.02)
     assert np.abs(points).max() < 2.5 + 0.15
-
-
-def gap(points: NDArray[np.float64]) -> float:
-    """Distance from the place in the disc of radius 1 that is farthest from any point, over that between points of a
-    square lattice as dense.
-    """
-    places = (np.arange(80) + 0.5) / 40 - 1
-    every = np.stack(np.meshgrid(places, places), -1).reshape(-1, 2)
-    inside = every[np.hypot(*every.T) < 1]
-    return float(np.hypot(*(inside[:, None] - points).T).min(0).max() / np.sqrt(np.pi / len(points)))
-
-
-@pytest.mark.parametrize("count", [4, 6, 8, 12, 32])
-def test_cameras_lie_all_over_the_opening(count) -> None:
-    assert gap(aperture_points(DISC, 2.0, UNLIMITED, count)) < 1.15
 
 
 @pytest.mark.parametrize("case", FROM_GEOMETRY)

@@ -1,17 +1,15 @@
 from dataclasses import replace
-from itertools import product
 from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
 
-from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.color import linear_from_srgb
 from iibr_core.gloss.geometry import SceneGeometry
 from iibr_core.gloss.microfacet import reflected_share
 from iibr_core.gloss.normals import fit_normals
-from iibr_core.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
+from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.gloss.shading import make_gloss_maps, shade, shade_views
-from iibr_core.gloss.surface_mask import surface_mask
 from iibr_core.types import GridShape, ViewOffset, ViewUpdate
 
 SIZE = 60, 80
@@ -125,31 +123,6 @@ def test_rounding_from_pixel_to_pixel_does_not_show_in_the_normals_of_a_large_ma
     assert np.abs(np.diff(normals[..., 0], axis=1)).max() < 0.01
 
 
-def test_depth_and_colour_choose_the_surface():
-    disparity = np.tile(np.linspace(0, 10, 11, dtype=np.float32), (3, 1))
-    photo = np.zeros((3, 11, 3), np.float32)
-    photo[1] = (1, 0, 0)
-    near_red = GlossSurface(farthest=0.55, color=(1, 0, 0), tolerance=0.1)
-    mask = surface_mask(near_red, photo, disparity)
-    assert mask[1].tolist() == [0] * 6 + [1] * 5
-    assert not mask[[0, 2]].any()
-
-
-def test_strokes_mark_and_erase_in_their_order():
-    flat, photo = np.zeros((20, 40), np.float32), np.zeros((20, 40, 3), np.float32)
-    across = GlossStroke(((0.25, 0.5), (0.75, 0.5)), 0.05)
-    middle = GlossStroke(((0.5, 0.5),), 0.05, erases=True)
-    mask = surface_mask(GlossSurface(strokes=(across, middle), strokes_only=True), photo, flat)
-    y, x = np.mgrid[:20, :40]
-    path = np.abs(y - 9.5) ** 2 + np.maximum(np.abs(x - 19.5) - 10, 0) ** 2 <= 4
-    hole = (y - 9.5) ** 2 + (x - 19.5) ** 2 <= 4
-    assert np.array_equal(mask > 0, path & ~hole)
-    beyond = GlossStroke(((-0.9, -0.9),), 0.01), GlossStroke(((-0.05, 0.05),), 0.2)
-    mask = surface_mask(GlossSurface(strokes=beyond, strokes_only=True), photo, flat)
-    assert mask[0, 0] == 1
-    assert not mask[:, 20:].any(), "only what of it they reach"
-
-
 GREY = np.full((*SIZE, 3), 0.4, np.float32)
 GLOSS = Gloss(roughness=0.35, light=GlossLight((-0.3, -0.3, -1)))
 
@@ -162,38 +135,6 @@ def shaded(gloss, maps, offset, disparity=None, photo=GREY):
     colors = photo.copy()
     shade(colors, maps.disparity if disparity is None else disparity, ViewOffset(*offset), gloss, maps)
     return colors
-
-
-SOME = slice(4, -4, 3)
-
-
-def plainly_shaded(gloss, maps, offset, photo):
-    """The same of a flat map, whose disparity is known at every place: pixel by pixel, by the docstrings' formulas."""
-    height, width = maps.mask.shape
-    result = linear_from_srgb(photo)
-    light, focal = gloss.light.unit_direction, maps.geometry.focal_px
-    for y, x in product(range(height)[SOME], range(width)[SOME]):
-        d = maps.disparity[y, x]
-        v, u = y + d * offset[0], x + d * offset[1]
-        if not (0 <= v <= height - 1 and 0 <= u <= width - 1):
-            continue
-        near = d - maps.geometry.infinity
-        point = np.array([(u - (width - 1) / 2) / near, (v - (height - 1) / 2) / near, focal / near])
-        eye = np.array([offset[1], offset[0], 0]) - point
-        eye /= np.linalg.norm(eye)
-        normal = maps.normals[round(v), round(u)]
-        share = reflected_share(tuple(normal), tuple(eye), light, gloss.lobe)
-        for c in range(3):
-            result[y, x, c] += share * (gloss.light.radiance[c] - result[y, x, c])
-    return srgb_from_linear(result)
-
-
-@pytest.mark.parametrize("offset", [(0, 0), (1, -2)])
-def test_it_is_the_lobe_at_every_pixel(offset):
-    flat = np.full(SIZE, 0.75, np.float32)
-    maps = maps_of(GLOSS, flat)
-    found, expected = shaded(GLOSS, maps, offset), plainly_shaded(GLOSS, maps, offset, GREY)
-    assert np.allclose(found[SOME, SOME], expected[SOME, SOME], atol=1e-4)
 
 
 def test_on_a_plane_the_highlight_of_a_far_light_stays_in_the_frame_of_what_is_far():
@@ -217,14 +158,6 @@ def test_a_plane_seen_edge_on_is_no_brighter_than_the_light(roughness):
     light = linear_from_srgb(shaded(gloss, maps, (0, 1)))
     assert light.min() >= linear_from_srgb(GREY).min() - 1e-4
     assert light.max() <= max(gloss.light.radiance) + 1e-3
-
-
-def test_what_shows_beside_a_surface_in_other_views_gets_none_of_its_gloss():
-    disparity, _, hit = sphere()
-    gloss = replace(GLOSS, surface=GlossSurface(farthest=0.1), reflectance=1.0)
-    maps = maps_of(gloss, disparity)
-    wall = np.full(SIZE, disparity[~hit].max(), np.float32)
-    assert np.array_equal(shaded(gloss, maps, (0, 3), disparity=wall), GREY)
 
 
 @pytest.mark.parametrize("is_marked", [True, False])

@@ -5,9 +5,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.method.ambiguous_rays import (
     FAINT_WEIGHT,
     MIN_COLOR_CHANGE,
-    MIN_HYPOTHESIS_WEIGHT,
     SHARE,
-    blend,
     find_ambiguous_rays,
 )
 from iibr_core.method.candidates import find_candidates
@@ -90,22 +88,6 @@ def test_features_know_no_colour_and_no_place():
     moved, _, _ = ambiguous_of(photo, np.roll(disparity.values, (down, right), axis=(0, 1)), fringe=False)
     assert (moved.pixel == here.pixel + np.array([down, right])).all()
     assert moved.features == pytest.approx(here.features, abs=1e-5)
-
-
-def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
-    photo, disparity = square_before_wall()
-    ambiguous, _, rays = ambiguous_of(photo, disparity.values)
-    random = np.random.default_rng(0)
-    weights = random.uniform(0.01, 1, ambiguous.mask.shape).astype(np.float32) * ambiguous.mask
-    weights /= weights.sum(axis=1, keepdims=True)
-    colors, disparities, source = blend(rays, ambiguous, weights)
-    kept = np.where(weights > MIN_HYPOTHESIS_WEIGHT, weights, 0)
-    alone = [blend(rays, ambiguous, slot * ambiguous.mask)[0] for slot in np.eye(weights.shape[1], dtype=np.float32)]
-    light = (kept[..., None] * linear_from_srgb(np.stack(alone, axis=1))).sum(axis=1)
-    assert colors == pytest.approx(srgb_from_linear(light / kept.sum(axis=1, keepdims=True)), abs=1e-4)
-    at = np.arange(len(weights)), weights.argmax(axis=1)
-    assert (disparities == ambiguous.disparity[at]).all()
-    assert (source == ambiguous.source[at]).all()
 
 
 def test_a_transformer_that_repeats_the_closed_form_changes_nothing():

@@ -7,8 +7,6 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.look_up import look_up
 from iibr_core.method.rays import CELL_PX
 from iibr_core.method.smooth_cells import find_smooth_cells
-from iibr_core.method.steep_surfaces import BELOW, MIN_RUN, RIGHT, STEEP_SHARE, is_joined, join_steep_rays
-from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.method.ray_sets import ray_set
 from tests.iibr_core.scenes import smooth_texture
@@ -84,43 +82,6 @@ def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
     smooth, _ = find_smooth_cells(rays, at, (0, SIZE[0]))
     assert by_pixel(smooth)[20:24, 20:24].all() == is_smooth
     assert by_pixel(smooth)[8:12, 48:52].all()
-
-
-STEEP_STEP = 0.5
-
-
-def join_slowly(disparity):
-    """Line by line: a step is a surface's if MIN_RUN steps on one side follow it, each as large as the last."""
-    connected = np.zeros(disparity.shape, np.uint8)
-    for bit, lines, marked in ((RIGHT, disparity, connected), (BELOW, disparity.T, connected.T)):
-        for line, marks in zip(lines, marked):
-            steps = np.diff(line)
-            for x, own in enumerate(steps):
-                for side in (steps[x : x + MIN_RUN + 1], steps[max(x - MIN_RUN, 0) : x + 1]):
-                    sizes = np.abs(side)
-                    alike = np.abs(np.diff(side)) <= SLOPE_SHARE * np.maximum(sizes[1:], sizes[:-1])
-                    if abs(own) > STEEP_SHARE * STEEP_STEP and len(side) > MIN_RUN and alike.all():
-                        marks[x] |= bit
-    return connected
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
-@pytest.mark.parametrize("unknown", [0.0, 0.03])
-def test_joined_rays_against_a_slow_twin(noise, unknown):
-    random = np.random.default_rng(2)
-    y, x = np.mgrid[:24, :31]
-    disparity = (0.4 * x - 0.7 * y + noise * random.normal(size=y.shape)).astype(np.float32)
-    disparity[:, 20:] += 6
-    disparity[random.random(disparity.shape) < unknown] = np.nan
-    connected = join_steep_rays(disparity, STEEP_STEP)
-    assert (connected == join_slowly(disparity)).all()
-    assert (connected > 0).mean() > 0.8 or noise > 0
-    either = is_joined(connected)
-    assert either[1:, 1:].sum() == sum(
-        bool(connected[y, x] or connected[y, x - 1] & RIGHT or connected[y - 1, x] & BELOW)
-        for y in range(1, 24)
-        for x in range(1, 31)
-    )
 
 
 @pytest.mark.parametrize("slope", [-3.0, -0.9, -0.6, -0.3, 0.3, 0.6, 0.8])
