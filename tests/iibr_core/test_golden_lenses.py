@@ -11,14 +11,14 @@ from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights, vi
 from iibr_core.beyond.aperture_shape import openness
 from iibr_core.beyond.lens import LensSum
 from iibr_core.beyond.lens_slices import slices_of
-from iibr_core.beyond.optics import CENTRE, ApertureMask, ApertureShape, Optics
+from iibr_core.beyond.optics import ApertureMask, ApertureShape, Optics
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.formats.images.write import write_image
 from iibr_core.gloss.geometry import SceneGeometry
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
 from iibr_core.gloss.shading import make_gloss_maps, shade_views
-from iibr_core.types import GridShape, ImageSize, ViewOffset, ViewUpdate
-from tests.iibr_core.hard_scene import GRID, HEIGHT, WIDTH, assert_golden, grey, hard_field, hard_scene, with_maps
+from iibr_core.types import CENTRE, GridShape, ImageSize, ViewOffset, ViewUpdate
+from tests.iibr_core.golden_scene import GRID, HEIGHT, WIDTH, assert_golden, grey, hard_field, hard_scene, with_maps
 from tests.iibr_core.unequal_rows import write_unequal_rows
 
 ARROW = np.array([[0, 255, 0, 0], [255, 255, 255, 0], [0, 255, 0, 120]], np.uint8)

@@ -22,7 +22,7 @@ from iibr_core.method.rays import RaysBehind, rays_of_photo
 from iibr_core.method.steep_surfaces import join_steep_rays
 from iibr_core.stages import ALL_STAGES
 from iibr_core.types import Margins, ViewOffset
-from tests.iibr_core.hard_scene import assert_golden, grey, hard_scene, with_maps
+from tests.iibr_core.golden_scene import assert_golden, grey, hard_scene, with_maps
 
 OFFSET = ViewOffset(1.0, -2.0)
 
