@@ -14,14 +14,53 @@ from iibr_core.method.farthest_views import (
 )
 from iibr_core.method.memory import scene_bytes
 from iibr_core.method.plan import (
-    MAX_VIEWS_A_SIDE,
-    STEP_PX,
     PlanOverrides,
     plan_for_viewing,
     plan_literal,
 )
 from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError, ViewOffset
+from tests.golden_text import assert_same_text
 from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture, square_before_wall
+
+WIDE = square_before_wall(60, 1000, background=-1.0)
+PLANS = {
+    "planned": lambda: plan_for_viewing(*WIDE),
+    "weak": lambda: plan_for_viewing(*WIDE, PlanOverrides(depth_strength=0.3)),
+    "strong": lambda: plan_for_viewing(*WIDE, PlanOverrides(depth_strength=-50.0)),
+    "none": lambda: plan_for_viewing(*WIDE, PlanOverrides(depth_strength=0.0)),
+    "chosen": lambda: plan_for_viewing(*WIDE, PlanOverrides(GridShape(3, 8), -1.5, 2.0, "diffusion:folder")),
+    "hdr with wild pixels": lambda: plan_for_viewing(replace(WIDE[0], is_hdr=True), with_wild(WIDE[1].values)),
+    "flat": lambda: plan_for_viewing(WIDE[0], disparity_of(np.full((60, 1000), -3.0))),
+    "literal": lambda: plan_literal(*WIDE, GridShape(4, 3)),
+    "literal and wide": lambda: plan_literal(*square_before_wall(60, 80, 20.0), GridShape(2, 3), inpaint="diffusion:a"),
+    "literal and still": lambda: plan_literal(*square_before_wall(60, 80, 0.2), GridShape(3, 3)),
+    "literal row": lambda: plan_literal(*square_before_wall(60, 80, -2.0), GridShape(1, 7)),
+}
+
+
+def with_wild(values):
+    wild = values.copy()
+    wild[10, 3:40:4], wild[50, 77] = 1e6, -500.0
+    return disparity_of(wild)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_plans_and_their_words(name, regenerate_golden):
+    plan = PLANS[name]()
+    field = plan.field_disparity(WIDE[1])
+    numbers = {
+        "grid": list(plan.grid),
+        "given per mille": 1000 * plan.disparity_scale,
+        "zero": plan.disparity_zero,
+        "range": list(plan.disparity_range_px),
+        "edges": 100 * plan.edge_fraction,
+        "bytes": plan.field_bytes,
+        "ends": list(plan.given_range or ()),
+        "field": [float(part) for part in (field.values.min(), field.values.mean(), field.values.max())],
+    }
+    lines = [f"{key}: {value}" for key, value in numbers.items()]
+    lines += [f"holes: {plan.has_disocclusion}", *plan.reasons, *plan.notes, field.source]
+    assert_same_text(lines, "core/plans", name, regenerate_golden, 1e-4, 1e-4)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -33,33 +72,13 @@ def test_parallax_is_a_share_of_the_width_whatever_the_units(scale):
     assert plan.has_disocclusion
 
 
-def test_every_choice_can_be_overridden_and_the_grid_follows_the_parallax():
-    photo, disparity = square_before_wall(60, 200)
-    plan = plan_for_viewing(photo, disparity, PlanOverrides(GridShape(3, 7), -1.0, focus_disparity=2.0))
-    assert plan.grid == (3, 7)
-    assert plan.disparity_zero == 2.0
-    assert plan.disparity_scale < 0
-    assert plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=0.0)).grid == (1, 1)
-    photo, disparity = square_before_wall(60, 1000)
-    small, huge = (plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=at)).grid for at in (0.3, 50))
-    assert small.columns < plan_for_viewing(photo, disparity).grid.columns < huge.columns == MAX_VIEWS_A_SIDE
-    assert 0.3 * TOTAL_PARALLAX * 1000 / (small.columns - 1) <= STEP_PX
-    for strength in (float("nan"), float("inf")):
+def test_what_cannot_be_planned_is_refused():
+    for strength in (float("nan"), float("inf"), 101.0):
         with pytest.raises(InputError, match="depth strength"):
-            plan_for_viewing(photo, disparity, PlanOverrides(depth_strength=strength))
-
-
-def test_literal_takes_disparity_as_it_is():
-    photo, disparity = square_before_wall()
-    plan = plan_literal(photo, disparity, GridShape(3, 3))
-    assert (plan.field_disparity(disparity).values == disparity.values).all()
-    assert plan.disparity_range_px == (0.0, 2.0)
-    assert 0 < plan.edge_fraction < 0.5
-    wide = plan_literal(*square_before_wall(foreground=20.0), GridShape(3, 3))
-    assert "moves 40 px against the farthest" in wide.notes[0]
+            plan_for_viewing(*WIDE, PlanOverrides(depth_strength=strength))
     for empty in (GridShape(0, 3), GridShape(3, 0)):
         with pytest.raises(InputError, match="give at least one view each way"):
-            plan_literal(photo, disparity, empty)
+            plan_literal(*WIDE, empty)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -120,12 +139,6 @@ def drawn_px(values, **overrides):
     plan = planned(values, **overrides)
     field = plan.field_disparity(disparity_of(values)).values
     return float(field.max() - field.min()) * (max(plan.grid) - 1)
-
-
-@pytest.mark.parametrize("noise", [0.0, 1e-4, 0.05])
-@pytest.mark.parametrize("share", [0.001, 0.008, 0.3])
-def test_a_bird_before_a_wall_moves_as_far_as_planned(noise, share):
-    assert drawn_px(bird(noise, share)) == pytest.approx(TOTAL_PARALLAX * WIDTH, rel=1e-3)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
