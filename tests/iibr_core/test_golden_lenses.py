@@ -50,9 +50,9 @@ def of_stored_views(folder):
 def summed_up(_):
     """Return sums of stored views as a lens off the middle sees them, of an ordinary and an HDR photo."""
     optics = Optics(
-        ViewOffset(-0.6, 0.8), focus_disparity=2.5, focus_range=1.2, focus_tilt=(1.0, -0.7), aperture_diameter=3.1,
+        ViewOffset(-0.6, 0.8), focus_disparity=-2.5, focus_range=1.2, focus_tilt=(-1.0, 0.7), aperture_diameter=3.1,
         aperture_shape=ApertureShape("cat_eye", cat_eye=0.7), highlight_recovery=0.6, exposure_stops=-0.8,
-    ).with_focus_scaled(0.9)  # fmt: skip
+    ).with_focus_scaled(-0.9)  # fmt: skip
     pictures = []
     for whole in (hard_field(), hard_field(True)):
         lens = LensSum(optics, ImageSize(HEIGHT, WIDTH), whole.views.dtype == np.float16)
@@ -108,7 +108,8 @@ GLOSSES = {
 def glossy(name):
     """Return views beside the middle with gloss, ordinary and HDR, and the surface and its normals."""
     gloss, (photo, disparity), pictures = GLOSSES[name], hard_scene(), []
-    maps = make_gloss_maps(gloss.surface, photo, disparity, SceneGeometry(95.0, -2.5))
+    geometry = SceneGeometry(95.0, 0.1 if name == "varnish" else -2.5)  # some of the wall is farther than infinity
+    maps = make_gloss_maps(gloss.surface, photo, disparity, geometry)
     for whole, at in ((hard_field(), (0, 4)), (hard_field(True), (3, 1))):
         given = ViewUpdate(*at, whole.views[at], whole.disparity[at], whole.inpainted[at])
         (view,) = shade_views(iter([given]), gloss, maps, GRID.offset)

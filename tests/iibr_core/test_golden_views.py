@@ -56,7 +56,7 @@ def for_viewing():
     photo, disparity = hard_scene()
     given = 40 - 10 * disparity
     given[30, 60:63] = 1e5
-    scene = iibr.from_arrays(convert(photo, DISPLAY_P3, SRGB), given)
+    scene = iibr.from_arrays(convert(photo, SRGB, DISPLAY_P3), given)
     return stored(scene.light_field((2, 3), depth_strength=-3.0), (0, 0), (1, 2), (0, 1))
 
 

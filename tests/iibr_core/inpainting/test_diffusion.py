@@ -7,9 +7,9 @@ import pytest
 
 from iibr_core.inpainting import diffusion
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.diffusion import LARGE_PX, large_gaps
+from iibr_core.inpainting.diffusion import LARGE_PX, align_in_gaps, large_gaps
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.runtime.work import watched
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -120,6 +120,39 @@ def test_large_is_where_a_square_fits():
     expected[3:11, 5:13] = True
     np.testing.assert_array_equal(large_gaps(hole), expected)
     assert not large_gaps(np.ones((3, 30), np.bool_)).any()
+
+
+@pytest.mark.parametrize(
+    ("slope", "start", "known", "expected"),
+    [(3.0, 2.0, 40, 1.25), (3.0, -9.0, 40, 1.25), (-3.0, 2.0, 40, -8.0), (0.0, 2.0, 40, -8.0), (3.0, 2.0, 0, -8.0),
+     (0.3, np.nan, 40, -8.0)],
+    ids=["fits", "whatever its zero", "would swap near and far", "flat", "nothing known", "not finite"],
+)  # fmt: skip
+def test_estimated_disparity_is_fitted_to_what_is_known_around(slope, start, known, expected):
+    """The gap holds 1.25, then values beyond all that is known around it, which are cut off."""
+    disparity = np.tile(np.linspace(0.0, 2.0, 60, dtype=np.float32), (40, 1))
+    hole = np.ones((40, 60), np.bool_)
+    hole[:, :25] = hole[:, 45:] = False
+    hole[known:] = True
+    large = np.zeros_like(hole)
+    large[:20, 28:42] = True
+    given = np.where(large, np.float32(1.25), disparity)
+    given[10:12, 30] = 50.0, -50.0
+    values = np.where(hole, np.float32(-8.0), disparity)
+    with np.errstate(invalid="ignore"):
+        align_in_gaps((slope * given + start).astype(np.float32), values, hole, large)
+    assert values[5, 35] == pytest.approx(expected, abs=1e-3)
+    reached = disparity[0, [16, 53]] if expected > 0 else (-8.0, -8.0)
+    assert (values[11, 30], values[10, 30]) == pytest.approx(tuple(reached), abs=1e-3)
+    assert (values[~large] == np.where(hole, np.float32(-8.0), disparity)[~large]).all()
+
+
+def test_painting_stops_when_the_job_is_cancelled(folder):
+    done = []
+    inpaint = load_inpainter(f"diffusion:{folder}")
+    with watched(lambda *progress: done.append(progress)), stoppable(lambda: bool(done)), pytest.raises(Cancelled):
+        inpaint(*view_with_holes(), OFFSET)
+    assert len(done) == 1
 
 
 def test_errors_are_one_line_that_names_the_folder(folder, tmp_path):
