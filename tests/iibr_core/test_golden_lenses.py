@@ -92,7 +92,7 @@ def apertures(_):
 GLOSSES = {
     "varnish": Gloss(
         GlossSurface(0.02, 0.6, strokes=(GlossStroke(((0.2, 0.35), (0.9, 0.3)), 0.06, erases=True),)),
-        0.35, 0.06, GlossLight((-0.54, 0.9, -0.3), (1.0, 0.8, 0.5), 6.0),
+        0.35, 0.06, GlossLight((-0.15, 0.12, -1.0), (1.0, 0.8, 0.5), 6.0),
     ),
     "metal": Gloss(
         GlossSurface(color=(0.8, 0.25, 0.2), tolerance=0.3), 0.6, 0.7, GlossLight((0.1, 0.5, -1.0), radius_deg=20.0)

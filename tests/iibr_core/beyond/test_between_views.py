@@ -1,12 +1,17 @@
+from itertools import product
+
 import numpy as np
 import pytest
 
+import iibr_core as iibr
 from iibr_core.beyond.between_views import densify, require_steps
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.method import memory
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from tests.iibr_core.known_scenes import write_grid
 from tests.iibr_core.scenes import by_index, disparity_of, generate, literal_plan, photo_of, smooth_texture
 
 SPARSE, DENSE = GridShape(3, 3), GridShape(5, 5)
@@ -95,3 +100,15 @@ def test_the_centre_comes_first_given_or_not_and_every_view_once(sparse, dense):
 def test_grids_that_do_not_fit_are_refused_with_those_that_do(sparse, dense, advice):
     with pytest.raises(InputError, match=advice):
         require_steps(GridShape(*sparse), GridShape(*dense))
+
+
+def test_fields_that_lack_views_or_room_get_none_between(tmp_path, monkeypatch):
+    star = write_grid(tmp_path / "star")
+    for v, u in product((0, 2), repeat=2):
+        (star / "views" / f"v{v:02d}_u{u:02d}.png").unlink()
+    with pytest.raises(InputError, match=r"star.*: only 5 of 9 views are there; get the others"):
+        iibr.open(star).light_field((5, 5))
+    whole = iibr.open(write_grid(tmp_path / "whole"))
+    monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * 40 * 48 * 9 * 60 - 2)
+    with pytest.raises(InputError, match=r"making views between 3x3 of whole \(48x40\) takes 1 MiB"):
+        whole.light_field((5, 5))

@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.method.ambiguous_rays import (
-    FAINT_WEIGHT,
     MIN_COLOR_CHANGE,
     SHARE,
     find_ambiguous_rays,
@@ -37,31 +35,6 @@ def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
 def motley(size, seed=0):
     """A photo of which no two pixels look alike: all that could be decided is seen."""
     return photo_of(np.random.default_rng(seed).random((*size, 3)).astype(np.float32))
-
-
-def test_rays_that_the_closed_form_leaves_open_are_ambiguous_and_no_others():
-    """Sharp edges, against a slow twin: covered in part, or by several surfaces, none of which is a fringe."""
-    photo, disparity = square_before_wall()
-    # The pixels just left of the square hold a third of its colour.
-    pixels, values = photo.pixels.copy(), disparity.values
-    y, x = np.nonzero((values[:, 1:] > 0) & (values[:, :-1] == 0))
-    pixels[:] = np.where(values[..., None] > 0, np.float32(0.1), np.float32(0.8))
-    pixels[y, x] = srgb_from_linear(linear_from_srgb(np.float32([0.1, 0.8])) @ np.float32([1 / 3, 2 / 3]))
-    photo = photo_of(pixels)
-    rays = rays_of_photo(photo.pixels, values, 2.0, 0)
-    assert len(rays) == 2
-    candidates = find_candidates(rays, OFFSET, (0, photo.size.height))
-    weights, _ = closed_form(candidates)
-    ambiguous, _, _ = ambiguous_of(photo, disparity.values)
-    heavy = weights > FAINT_WEIGHT
-    fringed = (heavy & (candidates.source == 1)).any(axis=0)
-    is_open = (weights.sum(axis=0) < 1 - FAINT_WEIGHT) | ((heavy.sum(axis=0) > 1) & ~fringed)
-    asked = np.zeros_like(is_open)
-    asked[tuple(ambiguous.pixel.T)] = True
-    assert not (asked & ~is_open).any()
-    # Where only one surface is near, there is nothing to decide.
-    assert asked[:, 8:-8].sum() > 0.5 * is_open[:, 8:-8].sum()
-    assert (fringed & ~is_open).sum() > 10
 
 
 def test_where_hypotheses_look_alike_nothing_is_ambiguous():

@@ -2,18 +2,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.ndimage import maximum_filter
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.evaluation.warp import reference_warp
-from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
 from iibr_core.method.look_up import KEYS_A
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.method.rays import MIN_STEP_PX, rays_of_photo
-from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX
-from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
+from iibr_core.types import ImageSize, Margins, ViewOffset
 from tests.iibr_core.method.ray_sets import filled_rays
 from tests.iibr_core.scenes import smooth_texture
 
@@ -67,41 +63,6 @@ def test_both_margins_alike_continue_edges_beyond_the_frame(is_upright):
     offsets = [ViewOffset(along, 1.0) if is_upright else ViewOffset(1.0, along) for along in (-1.0, 1.0)]
     one, other = (Renderer().render(rays, offset).colors for offset in offsets)
     assert np.flip(other, 0 if is_upright else 1) == pytest.approx(one, abs=0.2), "but for what is inpainted"
-
-
-GRID, FARTHEST = GridShape(5, 5), 2.0
-BACK, CORK, BOARD = -0.5, 1.5, 5.0
-
-
-def board_cut_by_the_frame(slant):
-    """Return colours and disparity of a slanted board and cork behind it that run out of the right frame."""
-    y, x = np.indices((96, 128))
-    disparity = np.full(y.shape, BACK, np.float32)
-    disparity[(abs(y - 48) < 36) & (x > 60)] = CORK
-    disparity[(abs(y - 48 - slant * (x - 127)) < 14) & (x > 90)] = BOARD
-    texture = smooth_texture(96, 128)
-    tint = np.where(disparity[..., None] == BOARD, np.float32([1.0, 0.3, 0.2]), np.float32([0.3, 0.6, 1.0]))
-    return texture * tint, disparity
-
-
-@pytest.mark.parametrize("slant", [-0.5, -0.3, 0.0, 0.5])
-def test_no_view_shows_anything_inpainted_in_front_of_the_photo_and_its_continuation(slant):
-    colors, disparity = board_cut_by_the_frame(slant)
-    outer = outer_views_of_grid(GRID)
-    margins = outpainting_margins(disparity, outer)
-    assert margins.right > 0
-    rays = rays_of_photo(colors, disparity, FARTHEST, len(outer), margins=margins)
-    list(update(rays, outer, Renderer()))
-    continued = rays.arrays.disparity[0]
-    for row, column in np.ndindex(*GRID):
-        offset = GRID.offset(row, column)
-        view = Renderer().render(rays, offset)
-        known = reference_warp(colors, disparity, offset).visible
-        shown = reference_warp(np.zeros((*continued.shape, 3), np.float32), continued, offset)
-        # Landings are rounded: what lies within a pixel counts.
-        nearest = rays.in_view(maximum_filter(np.where(shown.hole, -np.inf, shown.disparity), 3))
-        in_front = view.inpainted & known & (view.disparity > nearest + EDGE_PX / FARTHEST)
-        assert not in_front.any()
 
 
 SMALL = ImageSize(18, 22)

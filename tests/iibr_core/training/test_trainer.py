@@ -1,5 +1,6 @@
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,6 +110,22 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_checkpoint(out,
     run.restore(checkpoint_path(out))
     assert run.step == 5
     assert all(torch.isfinite(tensor).all() for tensor in run.model.state_dict().values())
+
+
+def test_what_cannot_be_trained_is_refused_before_the_first_step(out):
+    def begin(place=out, **options):
+        train(Scorer(), pytest.fail, replace(CONFIG, **options), place, may_replace=False)
+
+    with pytest.raises(InputError, match="device nonsense: this machine has none; choose auto or cpu"):
+        begin(device="nonsense")
+    with pytest.raises(InputError, match=r"w\.bin: weights are written as \.safetensors"):
+        begin(out.with_name("w.bin"))
+    for there in (out, checkpoint_path(out), log_path(out)):
+        there.touch()
+        with pytest.raises(InputError, match=there.name):
+            begin()
+        there.unlink()
+    assert not list(out.parent.iterdir())
 
 
 def test_resume_needs_a_whole_checkpoint_of_this_model(out):
