@@ -71,21 +71,6 @@ def write_numbered(folder: Path, names: dict[str, ViewOffset], size: tuple[int, 
     return folder
 
 
-def write_stanford(folder: Path, rows: int, columns: int) -> Path:
-    """out_RR_CC_Y_X.png, rows counted upwards; each brighter than the one before, row by row from below."""
-    folder.mkdir(parents=True)
-    for k, (row, column) in enumerate(np.ndindex(rows, columns)):
-        pixels = np.full((HEIGHT, WIDTH, 3), (k + 1) / (rows * columns), np.float32)
-        write_image(folder / f"out_{row:02d}_{column:02d}_{-row}.0_{column}.0.png", pixels)
-    return folder
-
-
-def write_stereo_pair(folder: Path) -> Path:
-    write_numbered(folder, {f"im{n}.png": ViewOffset(0, n) for n in (0, 1)}, (HEIGHT, WIDTH))
-    write_pfm(folder / "disp0.pfm", np.full((HEIGHT, WIDTH), 7.5, np.float32))
-    return folder
-
-
 def write_llff_row(folder: Path) -> Path:
     write_numbered(folder / "images", {f"IMG_{n}.png": ViewOffset(0, n) for n in range(3)}, (HEIGHT, WIDTH))
     down, right, back = np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]]

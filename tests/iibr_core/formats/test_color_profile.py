@@ -1,5 +1,4 @@
 import struct
-import zlib
 from io import BytesIO
 
 import numpy as np
@@ -10,7 +9,7 @@ from PIL import Image, ImageCms
 from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.color_profile import read_profile
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import DISPLAY_P3, SRGB
+from iibr_core.types import SRGB
 
 P3 = ((0.51512, 0.24120, -0.00105), (0.29198, 0.69225, 0.04189), (0.15710, 0.06657, 0.78407))
 """XYZ under D50 of Display P3's red, green and blue, as in Apple's profile."""
@@ -99,23 +98,6 @@ def test_the_curve_of_a_profile_counts_for_floats_too(tmp_path, curve, is_grey):
     is_white = np.broadcast_to(stored > 1, expected.shape)
     np.testing.assert_allclose(read[~is_white], expected[~is_white], atol=1e-3)
     assert (read[is_white] > expected[is_white]).all()
-
-
-@pytest.mark.parametrize(
-    ("codes", "profile", "expected"),
-    [((12, 13), b"", DISPLAY_P3), ((1, 13), b"", SRGB), ((12, 13), profile_bytes(SRGB_PRIMARIES), DISPLAY_P3)],
-    ids=["P3", "sRGB", "beside a profile"],
-)
-def test_numbers_of_a_png_count_more_than_its_profile(tmp_path, codes, profile, expected):
-    path = tmp_path / "a.png"
-    Image.fromarray(COLORS).save(path, icc_profile=profile)
-    data, chunk = path.read_bytes(), b"cICP" + bytes((*codes, 0, 1))
-    chunk = len(chunk[4:]).to_bytes(4, "big") + chunk + zlib.crc32(chunk).to_bytes(4, "big")
-    first = data.index(b"iCCP" if profile else b"IDAT") - 4
-    path.write_bytes(data[:first] + chunk + data[first:])
-    photo = read_photo(path, keeps_primaries=True)
-    assert photo.color_space == expected
-    assert np.abs(255 * photo.pixels - COLORS).max() < 0.01
 
 
 @pytest.mark.parametrize(

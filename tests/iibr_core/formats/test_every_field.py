@@ -90,12 +90,18 @@ def star(folder: Path) -> None:
     write_views(folder, {f"input_Cam{7 * v + u:03d}.png": (v, u) for v, u in places})
 
 
-def stanford(row_mm: float, column_mm: float, pattern: str = "out_{v:02d}_{u:02d}_{y:.6f}_{x:.6f}_.png") -> Write:
-    """Return a writer of 3 x 4 views whose names state positions in millimetres, a little off the grid."""
+POSITIONS = "out_{v:02d}_{u:02d}_{y:.6f}_{x:.6f}_.png"
+
+
+def stanford(row_mm: float, column_mm: float, pattern: str = POSITIONS, only: Any = ()) -> Write:
+    """Return a writer of 3 x 4 views whose names state positions in millimetres, a little off the grid.
+
+    only: index of the views that are there.
+    """
 
     def write(folder: Path) -> None:
         jitter = np.random.default_rng(3).uniform(-0.02, 0.02, (3, 4, 2)) * (pattern[0] == "o")
-        for v, u in np.ndindex(3, 4):
+        for v, u in np.indices((3, 4))[:, *only].reshape(2, -1).T.tolist():
             down, right = (v, u) + jitter[v, u]
             name = pattern.format(v=v, u=u, y=row_mm * down + 700, x=column_mm * right - 300)
             step = abs(column_mm) or 1.0
@@ -104,14 +110,18 @@ def stanford(row_mm: float, column_mm: float, pattern: str = "out_{v:02d}_{u:02d
     return write
 
 
-def middlebury(folder: Path) -> None:
-    """Write the nine views of 2003 at a quarter of their size, with maps of integers of two of them."""
-    for n in range(9):
-        write_image(folder / f"im{n}.png", np.tile(view(0, n), (1, 15, 1))[:, :450])
-    for n, value in ((2, 120), (6, 100)):
-        stored = np.full((SIZE.height, 450), value, np.uint8)
-        stored[:, -30:] = 0
-        Image.fromarray(stored).save(folder / f"disp{n}.png")
+def middlebury(name: str, count: int, truths: tuple[int, int], width: int) -> Write:
+    """Return a writer of a row of views, with maps of integers of two of them, unknown at the right."""
+
+    def write(folder: Path) -> None:
+        for n in range(count):
+            Image.fromarray(np.tile(view(0, n), (1, 15, 1))[:, :width]).save(folder / name.format(n))
+        for n, value in zip(truths, (120, 100)):
+            stored = np.full((SIZE.height, width), value, np.uint8)
+            stored[:, -30:] = 0
+            Image.fromarray(stored).save(folder / f"disp{n}.png")
+
+    return write
 
 
 def middlebury_pair(folder: Path) -> None:
@@ -172,6 +182,10 @@ def without(write: Write, name: str) -> Write:
     return lambda folder: (write(folder), (folder / name).unlink())
 
 
+def cut_end(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-300])
+
+
 def write_named(folder: Path, pattern: str, rows: int, columns: int) -> dict[str, tuple[float, float]]:
     views = named(pattern, range(rows), range(columns))
     write_views(folder / "images", {f"{name}.png": at for name, at in views.items()})
@@ -230,13 +244,22 @@ LAYOUTS: dict[str, Write] = {
     "columns hole": views({f"{u:03d}_{v:03d}.ppm": (v, u) for v, u in np.ndindex(3, 4) if (v, u) != (0, 1)}),
     "stated": with_parameters(views(named("shot {k}.png", range(3), range(4), 5)), STATED),
     "too many": with_parameters(views(named("shot {k}.png", range(4), range(4))), STATED),
+    "far": views({"v0_u0.png": (0, 0), "v9999_u9999.png": (1, 1)}),
+    "by fours": views({f"shot {4 * k + 1}.png": divmod(k, 3) for k in range(9)}),
+    "cut": lambda folder: cut_end(write_views(folder, named("v{v}_u{u}.png", range(2), range(2))) / "v0_u1.png"),
     "guessed": views(named("beach {k}.png", range(1), range(5))),
     "holiday": views({f"IMG_202307{day}_1{day}{k}.png": (0, k) for day in (11, 14) for k in range(3)}),
     "odd": lambda folder: (write_views(folder, named("v{v}_u{u}.png", range(2), range(2))),
                            Image.new("RGB", (6, 8)).save(folder / "v1_u1.png")),
     "stanford up": stanford(-30.0, 30.0), "stanford left": stanford(12.0, -30.0), "stanford even": stanford(0.0, 0.0),
+    "stanford column": stanford(45.0, 20.0, only=(slice(None), 0)),
+    "stanford thin": stanford(45.0, 20.0, only=(slice(None), slice(None, None, 2))),
     "rendered": stanford(5.0, 5.0, "Camera 1_{v:02d}_{u:02d}_{y:f}_{x:f}_30_36.png"),
-    "middlebury": middlebury, "middlebury pair": middlebury_pair, "llff": llff, "llff free": llff_free,
+
+    "middlebury 2003": middlebury("im{}.png", 9, (2, 6), 450),
+    "middlebury 2001": middlebury("im{}.ppm", 9, (2, 6), 434),
+    "middlebury 2005": middlebury("view{}.png", 7, (1, 5), 463), "middlebury pair": middlebury_pair, "llff": llff,
+    "llff free": llff_free,
     "colmap": colmap(False), "colmap text": colmap(True), "llff hole": without(llff, "images/v0_u1.png"),
     "colmap hole": without(colmap(False), "images/pic 01.png"), "transforms": transforms,
     "nerfstudio": lambda folder: write_hard_field(folder / "field"),

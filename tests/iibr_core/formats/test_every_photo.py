@@ -16,10 +16,13 @@ from PIL.TiffImagePlugin import IFDRational
 
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
+from iibr_core.formats.images.write import write_image
 from iibr_core.types import DISPLAY_P3
 from tests.iibr_core import embedded_files as embedded
 from tests.iibr_core.facts import require_golden
 from tests.iibr_core.formats.opened import photo_facts
+from tests.iibr_core.formats.test_color_profile import ADOBE, profile_bytes
+from tests.iibr_core.formats.test_hdr import chunked
 from tests.iibr_core.formats.test_side_by_side import LEFT, RIGHT, write_jps
 from tests.iibr_core.formats.test_view_files import leia_image, lume_pad_2, write_mpo, write_stereo_jpeg
 from tests.iibr_core.hard_scenes import TURNED, lying, photo_colors
@@ -40,6 +43,7 @@ def exif_of(orientation: int, **camera: Any) -> Image.Exif:
     return exif
 
 
+IN_INCHES = exif_of(TURNED, t920a=20.0, ta20e=1000.0, ta210=2, ta002=2 * HEIGHT)
 FOCAL_PLANE = exif_of(TURNED, t920a=20.0, ta20e=1000.0, ta210=3, ta002=2 * HEIGHT, t829a=0.008, t829d=1.8)
 IN_35_MM = exif_of(8, ta405=50, t8827=100, ta434="wide\nlens", t9003="2024:05:06 07:08:09")
 
@@ -62,14 +66,14 @@ def by_heif(pixels: np.ndarray, **options: Any) -> Any:
     return lambda path: pillow_heif.from_pillow(Image.fromarray(pixels)).save(path, quality=100, chroma=444, **options)
 
 
-def by_tifffile(pages: list[np.ndarray], *, orientation: int = 1, icc: bytes = b"") -> Any:
+def by_tifffile(pages: list[np.ndarray], *, orientation: int = 1, icc: bytes = b"", reduced: int = 1) -> Any:
     """Return a writer of pages; the last one has the orientation and profile."""
 
     def write(path: Path) -> None:
         tags = [(0x0112, 3, 1, orientation, False), *([(34675, 7, len(icc), icc, True)] if icc else [])]
         with tifffile.TiffWriter(path) as file:
             for page in pages[:-1]:
-                file.write(page, photometric="rgb", subfiletype=1, metadata=None)
+                file.write(page, photometric="rgb", subfiletype=reduced, metadata=None)
             file.write(pages[-1], photometric="rgb", metadata=None, extratags=tags)
 
     return write
@@ -93,6 +97,33 @@ def lytro(is_illum: bool) -> Any:
     pictures = {at: as_bytes(Image.fromarray(pixels), "PNG") for at, pixels in SHARP.items()}
     focus = np.repeat(np.float32([[0.2, 1.0, 2.0, 4.0]]), 3, axis=0)
     return of_bytes(embedded.lytro_stack(pictures, focus, (HEIGHT, WIDTH), is_illum))
+
+
+def png_in_numbers(*codes: int, profile: bytes = b"") -> Any:
+    """Return a writer of a deep PNG that states its colours in numbers, beside a profile."""
+
+    def write(path: Path) -> None:
+        write_oiio(path, DEEP, ICCProfile=profile) if profile else write_oiio(path, DEEP)
+        data = path.read_bytes()
+        path.write_bytes(chunked(data, b"cICP", bytes((*codes, 0, 1))))
+
+    return write
+
+
+def avif_in_numbers(*codes: int) -> Any:
+    """Return a writer of an AVIF whose numbers for sRGB, which Pillow writes, are replaced."""
+    stored = as_bytes(Image.fromarray(PICTURE), "AVIF", quality=100, subsampling="4:4:4")
+    assert stored.count(b"nclx\0\x01\0\x0d") == 1
+    return of_bytes(stored.replace(b"nclx\0\x01\0\x0d", b"nclx" + struct.pack(">HH", *codes)))
+
+
+def profile_with_numbers(*codes: int) -> bytes:
+    """Return a profile of version 4.4 with such a tag: ICC.1:2022, clause 9.2.17."""
+    profile = bytearray(profile_bytes())
+    at = 132 + 12 * (int.from_bytes(profile[128:132], "big") - 1)
+    profile[at : at + 12] = struct.pack(">4sII", b"cicp", len(profile), 12)
+    profile += b"cicp\0\0\0\0" + bytes((*codes, 0, 1))
+    return len(profile).to_bytes(4, "big") + bytes(profile[4:])
 
 
 def recording(path: Path) -> None:
@@ -131,18 +162,27 @@ def with_bad_end(kind: str, share: float) -> bytes:
 
 
 RIGHT_EYE = {f"{GPANO} ProjectionType": "cylindrical ", f"{embedded.GIMAGE} Mime": "image/jpeg"}
+DEEP = PICTURE.astype(np.uint16) * 257
 DOUBLE = np.hstack([PICTURE, np.repeat(DEPTH[..., None], 3, 2)])
 TILES = np.vstack([np.hstack([LEFT[:48, :64], RIGHT[:48, :64], LEFT[:48, :64], RIGHT[:48, :64]])] * 3)
 FILES: dict[str, tuple[Callable[[Path], object], int]] = {
     "turned.jpg": (by_pillow(pixels=lying(PICTURE), exif=FOCAL_PLANE, quality=95, subsampling=0, icc_profile=P3), 3),
     "turned_left.webp": (by_pillow("RGBA", RGBA, exif=IN_35_MM, lossless=True, exact=True), 1),
-    "turned.avif": (by_pillow(pixels=lying(PICTURE), exif=FOCAL_PLANE, quality=95, icc_profile=P3), 4),
+    "turned.avif": (by_pillow(pixels=lying(PICTURE), exif=IN_INCHES, quality=95, icc_profile=P3), 4),
     "turned.heic": (by_heif(lying(PICTURE), exif=FOCAL_PLANE.tobytes(), icc_profile=P3), 4),
     "mirrored.tif": (by_oiio(PICTURE, Orientation=5), 1),
     "codes.heic": (by_heif(PICTURE, color_primaries=12, transfer_characteristics=13, matrix_coefficients=6,
                            full_range_flag=1, save_nclx_profile=True), 4),
-    "deep.png": (by_oiio(PICTURE.astype(np.uint16) * 257, Exif__FocalLengthIn35mmFilm=28), 1),
-    "codes.jxl": (by_oiio(PICTURE.astype(np.uint16) * 257, CICP=(9, 18, 0, 1)), 1),
+    "deep.png": (by_oiio(DEEP, Exif__FocalLengthIn35mmFilm=28), 1),
+    "codes.jxl": (by_oiio(DEEP, CICP=(9, 18, 0, 1)), 1),
+    "pq.png": (png_in_numbers(9, 16), 1), "p3.png": (png_in_numbers(12, 13, profile=profile_bytes(ADOBE)), 1),
+    "dci.png": (png_in_numbers(11, 4), 1), "hlg.avif": (avif_in_numbers(9, 18), 4),
+    "pq.avif": (avif_in_numbers(9, 16), 4),
+    "pq.heic": (by_heif(PICTURE, color_primaries=9, transfer_characteristics=16, matrix_coefficients=9,
+                        full_range_flag=1, save_nclx_profile=True), 4),
+    "float.jxl": (by_oiio(PICTURE / np.float32(255), CICP=(9, 16, 0, 1)), 1),
+    "pq.jpg": (by_pillow(icc_profile=profile_with_numbers(9, 16), quality=100, subsampling=0), 5),
+    "pq.tif": (by_pillow(icc_profile=profile_with_numbers(9, 16)), 1),
     "la.png": (by_pillow("LA"), 1), "one.png": (by_pillow("1"), 1), "palette.png": (by_pillow("P"), 1),
     "grey.jpg": (by_pillow("L", quality=95), 3), "cmyk.jpg": (by_pillow("CMYK", quality=95), 3),
     "cmyk.tif": (by_pillow("CMYK"), 1), "lab.tif": (by_pillow("LAB"), 1),
@@ -152,6 +192,9 @@ FILES: dict[str, tuple[Callable[[Path], object], int]] = {
     "straight.tif": (by_oiio(RGBA, oiio__UnassociatedAlpha=1), 1),
     "premultiplied.exr": (by_oiio(np.dstack([LIGHT, RGBA[..., 3] / np.float32(255)])), 1),
     "wide.tif": (by_tifffile([PICTURE.astype(np.int32) * 16], orientation=3), 1),
+    "short.tif": (by_tifffile([PICTURE.astype(np.int16) * 9 - 100]), 1),
+    "pages.tif": (by_tifffile([PICTURE[::2, ::2], PICTURE[:, :40]], reduced=0), 1),
+    "larger.tif": (by_tifffile([PICTURE[::4, ::4], PICTURE], reduced=0), 1),
     "preview.tif": (by_tifffile([PICTURE[::4, ::4], lying(PICTURE)], orientation=TURNED), 1),
     "profile.tif": (by_tifffile([LIGHT / 3], icc=P3), 1),
     "odd.exr": (by_oiio(ODD_LIGHT, Orientation=2), 1), "half.exr": (by_oiio(LIGHT, kind="half"), 1),
@@ -169,9 +212,15 @@ FILES: dict[str, tuple[Callable[[Path], object], int]] = {
     "IMG_0001_TB.png": (by_pillow(), 1), "half.h-sbs.png": (by_pillow(), 1),
     "rows.jpg": (lambda path: write_jps(path, every_other_row(True), 1, 0), 4),
     "half.jpg": (lambda path: write_jps(path, np.hstack([LEFT[:, ::2], RIGHT[:, ::2]]), 2, 6), 4),
+    "over.jpg": (lambda path: write_jps(path, np.vstack([RIGHT, LEFT]), 3, 0), 3),
+    "low.jpg": (lambda path: write_jps(path, np.vstack([LEFT[::2], RIGHT[::2]]), 3, 5), 4),
+    "a_sbs.exr": (lambda path: write_image(path, np.hstack([LEFT, RIGHT])), 1),
+    "a_sbs.tif": (by_pillow("I;16", np.hstack([LEFT, RIGHT])[..., 1].astype(np.uint16) * 257), 1),
+    "a_sbs.heic": (by_heif(np.hstack([LEFT, RIGHT])), 4),
     "eyes.mpo": (lambda path: write_mpo(path, LEFT, RIGHT), 3),
     "eyes.jpg": (lambda path: write_stereo_jpeg(path, LEFT, RIGHT), 3),
     "eyes.lif": (of_bytes(leia_image(LEFT, RIGHT)), 3), "lume.jpg": (of_bytes(lume_pad_2(LEFT, RIGHT[::2, ::2])), 3),
+    "cut lume.jpg": (of_bytes(lume_pad_2(LEFT, RIGHT[:24])), 3),
     "eyes.heic": (lambda path: write_spatial_photo(path, LEFT, RIGHT, 80.0), 4),
     "a_RGBD.png": (by_pillow(pixels=np.vstack([DOUBLE[:, WIDTH:], PICTURE])), 1),
     "beside.png": (by_pillow(pixels=DOUBLE), 1), "tiles.png": (by_pillow(pixels=TILES), 1),

@@ -1,5 +1,5 @@
 import configparser
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,51 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.scenes import read_scene
-from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views, row_step_of
-from iibr_core.formats.light_fields.write import WRITERS, FieldScale, note_on_rows, write_light_field
+from iibr_core.formats.light_fields.views import disparity_range, read_views
+from iibr_core.formats.light_fields.write import WRITERS, FieldScale, write_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core import known_scenes as known
-
-LAYOUTS: dict[str, tuple[Callable[[Path], Path], str, GridShape]] = {
-    "hci": (lambda to: known.write_hci(to, 3, 5), "HCI 4D light field, 5x3", GridShape(3, 5)),
-    "views": (known.write_grid, "grid folder, 3x3", GridShape(3, 3)),
-    "stanford": (lambda to: known.write_stanford(to, 2, 3), "Stanford archive, 3x2", GridShape(2, 3)),
-    "middlebury": (known.write_stereo_pair, "Middlebury pair", GridShape(1, 2)),
-    "llff": (known.write_llff_row, "LLFF, 3x1", GridShape(1, 3)),
-}
-
-
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_the_viewer_and_the_evaluation_open_every_layout(tmp_path, name) -> None:
-    write, layout, grid = LAYOUTS[name]
-    folder = write(tmp_path / "scene")
-    scene, judged = open_light_field(folder), read_scene(folder)
-    assert (scene.name, scene.layout, scene.grid) == ("scene", layout, grid)
-    assert [view.path for view in scene.views] == [view.path for view in judged.views]
-    size, views = read_views(scene)
-    by_place = {(view.row, view.column): view for view in views}
-    assert sorted(by_place) == list(np.ndindex(*grid))
-    distances = [np.hypot(*grid.offset(*place)) for place in by_place]
-    assert distances == sorted(distances)
-    for (row, column), view in by_place.items():
-        assert view.colors.shape == (*size, 3)
-        np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
-    assert sum(view.disparity is not None for view in by_place.values()) == len(scene.disparity)
-
-
-@pytest.mark.parametrize(("spacing", "row_step"), [(1.0, 1.0), (0.4, 0.4), (-2.5, 2.5)])
-def test_rows_stand_as_far_apart_as_positions_in_names_say_but_for_jitter(tmp_path, spacing, row_step) -> None:
-    jitter = np.random.default_rng(3).uniform(-0.02, 0.02, (5, 5, 2))
-    for row, column in np.ndindex(5, 5):
-        y, x = 10 * (np.array((spacing * row, column)) + jitter[row, column])
-        write_image(tmp_path / f"out_{row:02d}_{column:02d}_{y:.3f}_{x:.3f}.png", np.zeros((4, 4, 3), np.float32))
-    found = row_step_of(open_light_field(tmp_path))
-    assert found == pytest.approx(row_step, rel=0.0 if row_step == 1 else 0.02)
-    assert (note_on_rows(found) is None) == (row_step == 1)
 
 
 def test_the_range_is_stated_or_that_of_the_map_nearest_to_the_centre(tmp_path) -> None:

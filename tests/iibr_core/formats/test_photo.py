@@ -3,7 +3,6 @@ import os
 
 import numpy as np
 import pytest
-import tifffile
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images import photo as photo_module
@@ -31,43 +30,6 @@ def area_average(linear, size):
 
     rows, columns = overlaps(linear.shape[0], size[0]), overlaps(linear.shape[1], size[1])
     return np.einsum("ij,jkc,lk->ilc", rows, linear.astype(np.float64), columns, optimize=True)
-
-
-@pytest.mark.parametrize("largest", [255, 4095, 10**6])
-@pytest.mark.parametrize("dtype", ["int32", "uint32", "int16"])
-def test_wide_integers_are_scaled_by_their_own_range(tmp_path, dtype, largest):
-    if largest > np.iinfo(dtype).max:
-        return
-    stored = RNG.integers(0, largest, (9, 8, 3), endpoint=True).astype(dtype)
-    stored[0, 0] = largest
-    white = 2 ** largest.bit_length() - 1
-    tifffile.imwrite(tmp_path / "a.tif", stored, photometric="rgb")
-    np.testing.assert_allclose(read_photo(tmp_path / "a.tif").pixels, stored / white, atol=1e-4)
-    assert read_photo(tmp_path / "a.tif", 20).size == (4, 4)
-
-
-@pytest.mark.parametrize("is_marked", [True, False])
-def test_the_photo_of_a_tiff_follows_its_preview(tmp_path, is_marked):
-    photo, preview = np.repeat(np.repeat(RGB, 4, 0), 4, 1), RGB
-    with tifffile.TiffWriter(tmp_path / "a.tif") as file:
-        file.write(preview, photometric="rgb", subfiletype=int(is_marked), metadata=None)
-        file.write(photo, photometric="rgb", metadata=None, extratags=[(ORIENTATION, 3, 1, 6, False)])
-    assert np.array_equal(np.rint(255 * read_photo(tmp_path / "a.tif").pixels), np.rot90(photo, -1))
-    assert read_photo(tmp_path / "a.tif", 2000).size == (51, 39)
-    with tifffile.TiffWriter(tmp_path / "pages.tif") as file:
-        for page in (preview, photo[:, :40], preview[:5]):
-            file.write(page, photometric="rgb", metadata=None)
-    assert read_photo(tmp_path / "pages.tif").size == preview.shape[:2]
-
-
-@pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.hdr"])
-def test_float_files_hold_linear_light(tmp_path, name):
-    linear = RNG.uniform(0.1, 6, (5, 9, 3)).astype(np.float32)
-    photo = read_photo(write_oiio(tmp_path / name, linear))
-    assert photo.is_hdr
-    # .hdr keeps one exponent for the three channels of a pixel.
-    assert (np.abs(linear_from_srgb(photo.pixels) - linear) <= linear.max(axis=2, keepdims=True) / 128).all()
-    assert not read_photo(write_oiio(tmp_path / f"dark-{name}", linear / 10)).is_hdr
 
 
 @pytest.mark.parametrize("max_pixels", [10_000, 2500])
@@ -104,18 +66,6 @@ def test_exif_orientation(tmp_path, orientation):
     smaller = read_photo(path, max_pixels=60)
     sizes = open_picture(path).upright_size, smaller.size
     assert smaller.notes == ("Made smaller by area averaging, from {} to {}.".format(*sizes),)
-
-
-@pytest.mark.parametrize(
-    ("shape", "orientation", "unit", "unit_mm"),
-    [((200, 300), 1, 2, 25.4), ((300, 200), 1, 3, 10), ((200, 300), 6, 3, 10)],
-)
-def test_focal_length_from_focal_plane(tmp_path, shape, orientation, unit, unit_mm):
-    """The camera took twice as many pixels as are stored, 1000 of them in an inch or centimetre."""
-    attributes = {"FocalLength": 20.0, "FocalPlaneXResolution": 1000.0, "FocalPlaneResolutionUnit": unit}
-    attributes = {f"Exif__{name}": value for name, value in {**attributes, "PixelXDimension": 2 * shape[1]}.items()}
-    path = write_oiio(tmp_path / "a.jpg", np.zeros((*shape, 3), np.uint8), Orientation=orientation, **attributes)
-    assert read_photo(path).focal_px == pytest.approx(20 * 1000 / unit_mm / 2, rel=1e-4)
 
 
 @pytest.mark.parametrize("max_pixels", [1, 40, 220])

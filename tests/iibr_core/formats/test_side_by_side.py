@@ -4,14 +4,12 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import pillow_heif
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.side_by_side import stated_pair
-from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.types import ImageSize
@@ -122,19 +120,3 @@ def test_the_descriptor_of_a_jps_states_its_arrangement(tmp_path, picture, layou
     assert shown.size == SIZE
     assert np.abs(255 * shown.pixels - LEFT).mean() < 12
     assert "JPS descriptor" in shown.notes[0]
-
-
-@pytest.mark.parametrize("ending", ["png", "exr", "heic", "tif"])
-def test_halves_of_every_format_are_compared(tmp_path, ending) -> None:
-    both, path = np.hstack([LEFT, RIGHT]), tmp_path / f"a_sbs.{ending}"
-    if ending == "heic":
-        pillow_heif.from_pillow(Image.fromarray(both)).save(path, quality=95)
-    elif ending == "exr":
-        write_image(path, both)
-    elif ending == "tif":
-        Image.fromarray(both[..., 1].astype(np.uint16) * 257).save(path)
-    else:
-        Image.fromarray(both).save(path, quality=95)
-    assert stated_pair(path)[0] is not None
-    assert read_photo(path).size == SIZE
-    assert open_light_field(path).layout == "side-by-side stereo"

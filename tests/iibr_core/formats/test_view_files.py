@@ -166,16 +166,6 @@ def test_a_leia_image_contains_inverse_depth(tmp_path, version) -> None:
     assert read_embedded(path) is None
 
 
-def test_smaller_views_of_a_leia_image_are_enlarged(tmp_path) -> None:
-    path, right = tmp_path / "a.jpg", smooth(shift=4)
-    path.write_bytes(lume_pad_2(smooth(), np.asarray(Image.fromarray(right).resize((32, 24), Image.Resampling.BOX))))
-    views = read_back(path)
-    assert np.abs(views[0, 1].astype(int) - right).mean() < 4
-    path.write_bytes(lume_pad_2(smooth(), right[:24]))
-    with pytest.raises(InputError, match=r"is 64x24, but a\.jpg is 64x48"):
-        read_back(path)
-
-
 UNKNOWN = "save it side by side with Leia's program, under a name that ends in '_2x1'"
 AGAIN = "get the whole file again"
 BAD_LEIA: dict[str, tuple[bytes, str]] = {
