@@ -70,6 +70,11 @@ def write_inputs(folder: Path) -> None:
     left, right = (np.rint(255 * seen(0.0, 2 * s)[0]).astype(np.uint8) for s in (0, 1))
     Image.fromarray(left).save(folder / "left.png")
     Image.fromarray(right).save(folder / "right.png")
+    pixels = np.rint(255 * colors).astype(np.uint8)
+    Image.fromarray(np.tile(pixels, (2, 3, 1))).save(folder / "q_qs3x2a1.5.png")
+    Image.fromarray(np.repeat(np.repeat(pixels, 14, 0), 14, 1)[: 14 * 30]).save(folder / "a_eslf.png")
+    Image.fromarray(np.hstack([right, left])).save(folder / "pair.jps", "JPEG", quality=95)
+    Image.fromarray(np.vstack([left, right])).save(folder / "x.top-bottom.jpg", quality=95)
     (folder / "gloss.toml").write_text(
         "roughness = 0.4\nreflectance = 0.5\n[surface]\nnearest = 0.6\n[light]\ndirection = [0.2, -0.3, -1]\n"
     )

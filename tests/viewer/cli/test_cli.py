@@ -1,6 +1,5 @@
 """The command line as a whole: help, paths in place of commands, pictures and light fields that are written."""
 
-import json
 import os
 import re
 import subprocess
@@ -17,10 +16,9 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.images.resized_light import mean_of_areas
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.scenes.scene import Source
-from iibr_core.types import TOTAL_PARALLAX, GridShape, ImageSize, ViewOffset
+from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.forked_iibr import run_forked
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.known_scenes import write_llff_row
@@ -123,31 +121,6 @@ def test_generate_writes_a_light_field_that_opens(iibr, photo_path, tmp_path):
     output_of(iibr("screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1"))
 
 
-@pytest.mark.parametrize(
-    ("words", "times"),
-    [
-        ((), 1.0),
-        (("--depth-strength", 0.5), 0.5),
-        (("--literal",), None),
-        (("--disparity", "{map}"), None),
-        (("--disparity", "{map}", "--planned"), 1.0),
-    ],
-)
-def test_a_named_map_is_taken_as_it_is(iibr, photo_path, tmp_path, words, times):
-    """As given, the square moves by 3 px from view to view: 12 of 96 from the first to the last. times: the parallax of
-    the window, None where it is as given.
-    """
-    out, given = tmp_path / "field", photo_path.with_name("scene_disparity.npy")
-    words = (str(word).replace("{map}", str(given)) for word in words)
-    done = iibr("generate", photo_path, "--grid", 5, "--refine", "off", "-o", out, *words)
-    values = read_pfm(out / "gt_disp_lowres.pfm")
-    if times is None:
-        np.testing.assert_array_equal(values, np.load(given))
-    else:
-        assert 4 * float(np.ptp(values)) == pytest.approx(times * TOTAL_PARALLAX * WIDTH)
-    assert ("In the window it is 4%" in done.stderr) == (times is None)
-
-
 def test_inpaint_names_the_method_for_generate_and_screenshot(iibr, monkeypatch, photo_path, tmp_path):
     monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
     pictures = {}
@@ -192,18 +165,6 @@ def test_full_needs_memory(iibr, monkeypatch, photo_path, tmp_path):
     assert not out.exists()
 
 
-@pytest.mark.parametrize("suffix", [".png", ".exr"])
-def test_like_repeats_a_saved_picture_except_for_given_options(iibr, photo_path, tmp_path, suffix):
-    first, again, other = (tmp_path / f"{name}{suffix}" for name in ("first", "again", "other"))
-    options = ("--grid", 3, "--view", "-1,0.5", "--focus", "-0.5", "--aperture", 2, "--depth-strength", 1.5)
-    output_of(iibr("screenshot", photo_path, *options, "--size", "150x100", "-o", first))
-    output_of(iibr("screenshot", photo_path, "--like", first, "-o", again))
-    np.testing.assert_array_equal(read_photo(again).pixels, read_photo(first).pixels)
-    output_of(iibr("screenshot", photo_path, "--like", first, "--aperture", 0, "-o", other))
-    assert read_photo(other).size == (100, 150)
-    assert (read_photo(other).pixels != read_photo(first).pixels).any()
-
-
 def test_like_repeats_edits_of_the_depth(iibr, photo_path, tmp_path):
     first, again = tmp_path / "first.png", tmp_path / "again.png"
     with OffscreenScene("egl") as viewer:
@@ -214,64 +175,6 @@ def test_like_repeats_edits_of_the_depth(iibr, photo_path, tmp_path):
     np.testing.assert_allclose(read_photo(again).pixels, read_photo(first).pixels, atol=1.01 / 255)
 
 
-def test_a_screenshot_is_woven_for_a_display(iibr, photo_path, tmp_path):
-    values = {"pitch": 50, "slope": -7, "center": 0.2, "DPI": 300, "screenW": 90, "screenH": 120, "invView": 1}
-    (tmp_path / "visual.json").write_text(json.dumps({key: {"value": value} for key, value in values.items()}))
-    words = ("screenshot", photo_path, "--grid", 3, "--calibration", tmp_path / "visual.json")
-    output_of(iibr(*words, "-o", tmp_path / "woven.png"))
-    woven = read_photo(tmp_path / "woven.png").pixels
-    assert woven.shape == (120, 90, 3)
-    top = (120 - round(90 * HEIGHT / WIDTH)) // 2
-    assert not woven[: top - 1].any(), "the photo is broader than the screen"
-    green, blue = woven[..., 1], woven[..., 2]  # equal in the photo, hence in every view
-    assert (np.abs(green - blue) > 0.1).any(), "the subpixels of a pixel belong to different views"
-
-
-def test_values_beyond_the_scene_are_refused_or_limited_with_a_note(iibr, photo_path, tmp_path):
-    words = ("screenshot", photo_path, "--grid", 3, "-o", tmp_path / "o.png")
-    assert "--view: S is 5; scene has -1 to 1" in refusal_of(iibr(*words, "--view", "5,0"))
-    assert "note: --aperture 99 exceeds what the scene has; 15 is used." in iibr(*words, "--aperture", 99).stderr
-    assert "note: --tilt down, 99 exceeds" in iibr(*words, "--force", "--tilt", "0,99", "--aperture", 1).stderr
-    assert "rotation 30: turns blades or a mask" in refusal_of(iibr(*words, "--force", "--rotation", 30))
-    assert "note: A closed lens shows nothing of shape;" in iibr(*words, "--force", "--blades", 5).stderr
-
-
-def test_plan_names_size_depth_and_reasons(iibr, photo_path):
-    first, *reasons = output_of(iibr("plan", photo_path)).splitlines()
-    assert first == "scene: 96x64 px, disparity from scene_disparity.npy"
-    deeper = output_of(iibr("plan", photo_path, "--depth-strength", 2))
-    for words, moves in ((" ".join(reasons), 4), (deeper, 8)):
-        assert f"The nearest moves {moves} px against the farthest" in words
-
-
-@pytest.mark.parametrize(
-    ("name", "layout", "views"),
-    [
-        ("field", "grid folder, 3x3, 96x64", "3 across, 3 down"),
-        ("a_qs3x2a1.5 (1).png", "quilt, 3x2 views, 96x64", "6 across, 1 down"),
-        ("a_eslf.png", "lenslet image, 8x8 of 14x14 views, 12x8", "8 across, 8 down"),
-    ],
-)
-def test_plan_names_what_views_are_recognised_as(iibr, photo_path, tmp_path, name, layout, views):
-    photo, path = Image.open(photo_path).convert("RGB"), tmp_path / name
-    if name == "field":
-        path.mkdir()
-        for row, column in np.ndindex(3, 3):
-            photo.save(path / f"v{row}_u{column}.png")
-        np.save(path / "disp_est_u01_v01.npy", np.full((64, 96), 1.25, np.float32))
-    else:
-        photo.resize((168, 112) if "eslf" in name else (288, 128)).save(path)
-    first, *reasons = output_of(iibr("plan", path)).splitlines()
-    origin = "the maps of 1 of 9 views" if name == "field" else "the views themselves, when they are opened"
-    assert first.split(": ", 1)[1] == f"{layout} px a view, disparity from {origin}"
-    assert f"- Views: {views}." in reasons
-    assert ("- Disparity goes from 1.25 to 1.25 px per view step." in reasons) == (name == "field")
-    assert "do not fill a grid of 5x7" in refusal_of(iibr("plan", path, "--grid", "5x7"))
-    if name == "field":
-        given = "--disparity", photo_path.with_name("scene_disparity.npy"), "--disparity-scale", 2
-        assert "- Disparity goes from -2.00 to 4.00 px per view step." in output_of(iibr("plan", path, *given))
-
-
 def test_plan_says_where_views_fill_no_grid(iibr, tmp_path):
     folder = write_llff_row(tmp_path / "row")
     poses = np.load(folder / "poses_bounds.npy")
@@ -280,18 +183,6 @@ def test_plan_says_where_views_fill_no_grid(iibr, tmp_path):
     first, second, *_ = output_of(iibr("plan", folder)).splitlines()
     assert first.endswith("disparity from no map")
     assert second == "- 3 views, which fill no regular grid: only `iibr evaluate` reads them."
-
-
-CASES = {"pair.jps": 1, "x.left-right.jpg": 1, "x.top-bottom.jpg": 0}
-"""Stereo photos by their names, and the axis that their two pictures lie along."""
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_plan_takes_the_depth_of_stereo_photos_from_their_two_views(iibr, photo_path, tmp_path, name):
-    photo, path = np.asarray(Image.open(photo_path).convert("RGB")), tmp_path / name
-    eyes = (np.roll(photo, -2, 1), photo) if name.endswith("jps") else (photo, np.roll(photo, -2, 1))
-    Image.fromarray(np.concatenate(eyes, CASES[name])).save(path, "JPEG", quality=95)
-    assert "96x64 px, disparity from the photo's two views (side-by-side stereo)" in output_of(iibr("plan", path))
 
 
 WINDOW_FIRST = """

@@ -107,6 +107,7 @@ COMMANDS = {
     ],
     "export-half-sbs": [
         "export hdr.exr --to half-sbs -o c.png --grid 3x5 --eyes 2.5 --focus-at 26,28",
+        "export hdr.exr --to half-sbs -o c.png --grid 3x5",
     ],
     "export-rgbd": [
         "export turned.jpg --to rgbd -o d.png --layout below",
@@ -137,6 +138,25 @@ COMMANDS = {
     ],
     "export-anaglyph": [
         "export views --to anaglyph -o m.png --eyes 1 --gloss gloss.toml",
+    ],
+    "screenshot-limited": [
+        "screenshot hdr.exr --grid 3 -o a.png --blades 5",
+        "screenshot hdr.exr --grid 3 -o b.png --tilt 0,99 --aperture 99 --f-number 0.1",
+        "screenshot hdr.exr --grid 3 -o b.png --tilt 0,99 --aperture 99 --focus=-9",
+    ],
+    "generate-metric": [
+        "generate bare.png -o a --grid 2x3 --disparity turned_depth.npy --planned --metric",
+        "generate bare.png -o b --grid 2 --disparity hdr_disparity.pfm --disparity-scale=-0.5 --quality fast --out b",
+        "generate hdr.exr -o c --grid 1x3 --disparity hdr_disparity.pfm --max-pixels 900",
+    ],
+    "plan-sheets": ["plan q_qs3x2a1.5.png", "plan a_eslf.png", "plan pair.jps", "plan x.top-bottom.jpg"],
+    "export-blur": ["export turned.jpg --to blur -o a.exr --focus-at 26,28 --f-number 0.9"],
+    "export-headset": ["export turned.jpg --to web -o a.html --for headset"],
+    "export-disparity": ["export views --to disparity -o found.pfm"],
+    "export-eslf": ["export field --to eslf -o b_eslf.png", "export field --to eslf -o b_eslf.png"],
+    "export-hci": ["export hdr.exr --to hci -o a --grid 2x3 --depth-strength 0.5 --gloss gloss.toml"],
+    "export-cross-eyed": [
+        "export turned.jpg --to cross-eyed -o a.tif --grid 3 --eyes 1 --focus 0.2 --cat-eye 0.5 --aperture 2"
     ],
     "batch-maps": [
         "batch photos --to disparity -o a --grid 3x2 --depth rough --depth-strength 2 --invert-depth"
