@@ -10,7 +10,7 @@ from PIL import Image
 
 from iibr_core.exports import batch
 from iibr_core.exports.batch import BatchCount, BatchSettings, check_batch_folder, photos_in, run_batch
-from iibr_core.exports.photo_folder import first_photo, list_photos
+from iibr_core.exports.photo_folder import FolderPhoto, first_photo, in_order, list_photos
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
@@ -142,6 +142,9 @@ def test_maps_folders_of_maps_hidden_files_and_others_are_no_photos(tmp_path) ->
     assert {photo.name for photo in list_photos(str(tmp_path))} == photos
     assert {str(path.relative_to(tmp_path)) for path, _ in photos_in([tmp_path])} == photos | below
     assert list_photos(str(tmp_path / "gone")) == ()
+    shots = [FolderPhoto("IMG_10.png", 2.0), FolderPhoto("IMG_9.png", 3.0), FolderPhoto("a.png", 1.0)]
+    assert [photo.name for photo in in_order(shots, "name")] == ["a.png", "IMG_9.png", "IMG_10.png"]
+    assert [photo.name for photo in in_order(shots, "time")] == ["a.png", "IMG_10.png", "IMG_9.png"]
 
 
 @pytest.mark.parametrize("inside", ["", "views"])

@@ -50,14 +50,20 @@ def test_a_file_of_another_ending_is_refused(tmp_path, name) -> None:
         require_export_place(kind, tmp_path / "a.xyz", (), True)
 
 
-@pytest.mark.parametrize(
-    ("kind", "name"), [("focal-stack", "stack"), ("gif", "a.gif"), ("quilt", "a.png"), ("hci", "field")]
-)
-def test_what_is_stopped_leaves_nothing(source, tmp_path, kind, name) -> None:
-    steps = iter(range(1000))
-    with pytest.raises(Cancelled), stoppable(lambda: next(steps) > 2):
-        exported(source, kind, tmp_path / name)
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("kind", ["focal-stack", "gif", "mp4", "quilt", "hci", "eslf", "npz", "colmap", "web", "mesh"])
+def test_what_is_stopped_leaves_the_older_output_and_nothing_beside_it(hard, tmp_path, kind) -> None:
+    path = tmp_path / f"a{(*EXPORTS[kind].endings, '')[0]}"
+    for is_first in (True, False):
+        before, steps = contents(tmp_path), iter(range(1000))
+        with pytest.raises(Cancelled), stoppable(lambda steps=steps: next(steps) > 2):
+            exported(hard["photo"], kind, path)
+        assert contents(tmp_path) == before
+        if is_first:
+            exported(hard["photo"], kind, path, **({"frames": 2} if kind in ("focal-stack", "gif", "mp4") else {}))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize("kind", ["depth", "point-cloud", "nerfstudio", "rgbd"])

@@ -87,6 +87,7 @@ MAPS: dict[str, tuple[Write, int]] = {
     "whole.npy": (by_numpy(ZEROS.astype(np.int64)), 0),
     "two.npy": (by_numpy(np.zeros((2, 32, 48))), 0), "words.npy": (by_numpy(np.array([["a"]])), 0),
     "a.npz": (lambda path: np.savez_compressed(path, conf=np.zeros(3), pred_depth=RAMP, depth_map=2 * RAMP), 0),
+    "only.npz": (lambda path: np.savez(path, values=RAMP), 0),
     "many.npz": (lambda path: np.savez(path, one=RAMP, two=RAMP), 0),
     "a.exr": (by_oiio(np.dstack([HOLES, RAMP > 2.1]).astype(np.float32), "float", ("Y", "A")), 0),
     "half.exr": (by_oiio(RAMP[..., None], "half", ("Y",)), 0), "channels.exr": (channels, 0),

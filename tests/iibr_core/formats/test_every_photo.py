@@ -43,7 +43,7 @@ def exif_of(orientation: int, **camera: Any) -> Image.Exif:
     return exif
 
 
-IN_INCHES = exif_of(TURNED, t920a=20.0, ta20e=1000.0, ta210=2, ta002=2 * HEIGHT)
+IN_INCHES = exif_of(TURNED, t920a=20.0, ta20e=1000.0, ta002=2 * HEIGHT)
 FOCAL_PLANE = exif_of(TURNED, t920a=20.0, ta20e=1000.0, ta210=3, ta002=2 * HEIGHT, t829a=0.008, t829d=1.8)
 IN_35_MM = exif_of(8, ta405=50, t8827=100, ta434="wide\nlens", t9003="2024:05:06 07:08:09")
 
@@ -183,6 +183,7 @@ FILES: dict[str, tuple[Callable[[Path], object], int]] = {
     "float.jxl": (by_oiio(PICTURE / np.float32(255), CICP=(9, 16, 0, 1)), 1),
     "pq.jpg": (by_pillow(icc_profile=profile_with_numbers(9, 16), quality=100, subsampling=0), 5),
     "pq.tif": (by_pillow(icc_profile=profile_with_numbers(9, 16)), 1),
+    "absurd.jpg": (by_pillow(exif=exif_of(1, ta405=60_000), quality=95), 3),
     "la.png": (by_pillow("LA"), 1), "one.png": (by_pillow("1"), 1), "palette.png": (by_pillow("P"), 1),
     "grey.jpg": (by_pillow("L", quality=95), 3), "cmyk.jpg": (by_pillow("CMYK", quality=95), 3),
     "cmyk.tif": (by_pillow("CMYK"), 1), "lab.tif": (by_pillow("LAB"), 1),
@@ -223,6 +224,7 @@ FILES: dict[str, tuple[Callable[[Path], object], int]] = {
     "cut lume.jpg": (of_bytes(lume_pad_2(LEFT, RIGHT[:24])), 3),
     "eyes.heic": (lambda path: write_spatial_photo(path, LEFT, RIGHT, 80.0), 4),
     "a_RGBD.png": (by_pillow(pixels=np.vstack([DOUBLE[:, WIDTH:], PICTURE])), 1),
+    "tall.rgbd.png": (by_pillow(pixels=np.hstack([DOUBLE[:, -24:], PICTURE[:, :24]])), 1),
     "beside.png": (by_pillow(pixels=DOUBLE), 1), "tiles.png": (by_pillow(pixels=TILES), 1),
     "stack-stk.lfp": (lytro(False), 1), "illum.LFP": (lytro(True), 1), "a.r3d": (recording, 3),
     "depth.jpg": (of_bytes(embedded.with_segments(as_bytes(Image.fromarray(PICTURE), "JPEG", quality=95),
