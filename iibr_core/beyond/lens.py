@@ -142,7 +142,6 @@ def _add_sheared(light, disparity, camera, weight, focus, barrel, rows, sums):
                     green += tap * light[row, column, 1]
                     blue += tap * light[row, column, 2]
             weights[y, x] += w
-            # Cubic weights undershoot beside recovered highlights, but no camera takes light away.
-            total[y, x, 0] += w * max(red, np.float32(0.0))
-            total[y, x, 1] += w * max(green, np.float32(0.0))
-            total[y, x, 2] += w * max(blue, np.float32(0.0))
+            total[y, x, 0] += w * red
+            total[y, x, 1] += w * green
+            total[y, x, 2] += w * blue

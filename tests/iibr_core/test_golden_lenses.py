@@ -51,7 +51,7 @@ def summed_up(_):
     """Return sums of stored views as a lens off the middle sees them, of an ordinary and an HDR photo."""
     optics = Optics(
         ViewOffset(-0.6, 0.8), focus_disparity=-2.5, focus_range=1.2, focus_tilt=(-1.0, 0.7), aperture_diameter=3.1,
-        aperture_shape=ApertureShape("cat_eye", cat_eye=0.7), highlight_recovery=0.6, exposure_stops=-0.8,
+        aperture_shape=ApertureShape("cat_eye", cat_eye=0.7), highlight_recovery=0.08, exposure_stops=-0.8,
     ).with_focus_scaled(-0.9)  # fmt: skip
     pictures = []
     for whole in (hard_field(), hard_field(True)):
@@ -122,7 +122,7 @@ PICTURES = {
         False, dict(focus=3.0, aperture=1.8, blades=5, roundness=0.4, rotation=20.0, highlights=3.0),
         dict(at=(70.0, 20.0), f_number=0.4, blades=3, rotation=-40.0),
     ),
-    "lens-ring": through_lenses(False, dict(focus=0.0, aperture=2.6, ring=0.6, tilt=(2.0, -1.0), highlights=4.0)),
+    "lens-ring": through_lenses(False, dict(focus=0.0, aperture=2.6, ring=0.6, tilt=(2.0, -1.0), highlights=2.0)),
     "lens-range": through_lenses(False, dict(focus=0.5, aperture=3.0, focus_range=1.5, cat_eye=0.9, tilt=(0.0, 1.0))),
     "lens-hdr": through_lenses(True, dict(focus=5.0, aperture=2.2, cat_eye=0.5), dict(focus=3.0)),
     "lens-mask": through_a_mask,
