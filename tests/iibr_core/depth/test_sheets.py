@@ -19,7 +19,9 @@ from tests.iibr_core.scenes import photo_of, smooth_texture
 from tests.image_compare import DECISIONS, assert_close, read_png, write_png
 
 
-def assert_sheet(name: str, maps: Iterable[FloatImage], span: tuple[float, float], columns: int, regenerate, folder):
+def assert_sheet(
+    name: str, maps: Iterable[FloatImage], span: tuple[float, float], columns: int, regenerate, folder, by=DECISIONS
+):
     """Compare maps in rows of a picture, from black (low) to white (high), a grey line between them."""
     low, high = span
     shares = (np.clip((np.nan_to_num(values, nan=low) - low) / (high - low), 0, 1) for values in maps)
@@ -34,7 +36,7 @@ def assert_sheet(name: str, maps: Iterable[FloatImage], span: tuple[float, float
     for row, column in np.ndindex(len(rows), columns):
         tile = np.s_[row * height :, column * width :]
         found, expected = (image[tile][:height, :width] for image in (sheet, kept))
-        assert_close(found, expected, DECISIONS, folder, f"{name}, row {row + 1}, column {column + 1}")
+        assert_close(found, expected, by, folder, f"{name}, row {row + 1}, column {column + 1}")
 
 
 HEIGHT, WIDTH = 60, 80
