@@ -17,6 +17,7 @@ from iibr_core.depth.editing.edits import (
     apply_tone,
     extent_of,
     invert_tone_curve,
+    levels_of,
     require_sound,
     tone_curve,
 )
@@ -64,6 +65,9 @@ def test_the_extent_leaves_wild_values_out_and_a_flat_map_has_one_too() -> None:
     assert -1 <= low < high <= 1
     low, high = extent_of(np.full((10, 200), 3.0, np.float32))
     assert (low, high) == (2.0, 4.0)
+    levels = levels_of(np.float32([[-9, 0, 0.1, 0.9, 1, np.nan, 7]]), (0.0, 1.0))
+    assert (levels.low, levels.high, sum(levels.counts)) == (0, 1, 6)
+    assert [at for at, count in enumerate(levels.counts) for _ in range(count)] == [0, 0, 6, 57, 63, 63]
     for shape in ((0, 0), (0, 5), (2, 3)):
         with pytest.raises(InputError, match="no disparity is known"):
             extent_of(np.full(shape, np.nan, np.float32))

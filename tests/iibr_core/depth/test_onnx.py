@@ -15,12 +15,13 @@ from iibr_core.depth.models.catalog import LocalModel, known_model, model_here, 
 from iibr_core.depth.models.download import local_folder
 from iibr_core.depth.models.onnx import depth_output
 from iibr_core.depth.models.preparation import USUAL_PREPARATION, read_preparation
-from iibr_core.depth.search import find_depth, open_with_depth
+from iibr_core.depth.search import estimator_of, find_depth, open_with_depth
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.images.write import write_image
 from iibr_core.interface.public_scene import estimate_depth
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
+from tests.iibr_core.depth.drawn_photo import usual_disparity
 from tests.iibr_core.depth.onnx_graphs import of_channels, of_points, save_graph, weighing
 
 MEAN, DEVIATION = (np.array(values, np.float32) for values in (USUAL_PREPARATION.mean, USUAL_PREPARATION.std))
@@ -126,9 +127,18 @@ def test_the_photo_shows_which_end_of_a_file_is_near(tmp_path, farness, config) 
     pixels[..., 0] = np.linspace(0.5, 0.9, 60)[:, None]
     pixels[20:30, 30:50, 1] = 0.5
     write_image(tmp_path / "photo.png", pixels)
-    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file)))
-    assert found.disparity.values[-5].mean() > found.disparity.values[5].mean()
-    assert any(f"the {'low' if farness else 'high'} end counts as near" in note for note in found.disparity.notes)
+    expected = usual_disparity(np.asarray(pixels[..., 0]))
+    for inverts, sign in ((False, 1), (True, -1)):
+        choice = DepthChoice(model=str(file), inverts=inverts, refine=False)
+        found = open_with_depth(tmp_path / "photo.png", choice)
+        np.testing.assert_allclose(found.disparity.values, sign * expected, atol=0.02)
+        end = "low" if farness != inverts else "high"
+        assert found.origin.near == f"the {end} end"
+        assert any(f"the {end} end counts as near" in note for note in found.disparity.notes)
+        estimate = estimator_of(found, choice)
+        np.testing.assert_allclose(estimate(pixels), sign * expected, atol=0.02)
+        np.testing.assert_allclose(estimate(pixels[::-1]), sign * expected[::-1], atol=0.02)
+    assert estimator_of(open_with_depth(tmp_path / "photo.png", DepthChoice("rough")), choice) is None
 
 
 @pytest.mark.parametrize(
@@ -264,16 +274,22 @@ def test_a_map_of_points_gives_metres_the_sky_and_the_focal_length(tmp_path) -> 
     assert stated.photo.focal_px == 77.0, "a file that states its focal length is believed"
 
 
-def test_the_focal_length_of_other_metric_models_is_used(tmp_path) -> None:
+@pytest.mark.parametrize(("name", "is_far"), [("sky", True), ("mask", False)])
+def test_focal_length_and_sky_of_other_metric_models_are_used(tmp_path, name, is_far) -> None:
     """As of Depth Pro, in pixels of its input."""
     nodes = [
         helper.make_node("ReduceMean", ["x"], ["depth"], axes=[1], keepdims=0),
         helper.make_node("Identity", ["length"], ["focallength_px"]),
+        helper.make_node("Identity", ["beyond"], [name]),
     ]
-    constants = {"length": np.array([84.0], np.float32)}
+    beyond = np.full((1, 56, 56), 0.4, np.float32)
+    beyond[:, :20] = 0.6
+    constants = {"length": np.array([84.0], np.float32), "beyond": beyond}
     takes = helper.make_tensor_value_info("x", TensorProto.FLOAT, [1, 3, 56, 56])
-    file = save_graph(tmp_path / "model.onnx", nodes, constants, takes, "depth", "focallength_px")
-    assert model_of(file).estimate(photo_of(112, 112)).focal_ratio == pytest.approx(1.5)
+    file = save_graph(tmp_path / "model.onnx", nodes, constants, takes, "depth", "focallength_px", name)
+    found = model_of(file).estimate(photo_of(112, 112))
+    assert found.focal_ratio == pytest.approx(1.5)
+    assert ((found.values > 1000) == ((beyond[0] > 0.5) == is_far)).all()
 
 
 @pytest.mark.parametrize("name", ["depth-anything-v2-small-int8", "moge-2-small", "midas-small"])

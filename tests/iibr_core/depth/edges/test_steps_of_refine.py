@@ -4,8 +4,6 @@ import pytest
 
 from benchmarks.scenes import network_like
 from iibr_core.depth.edges.blur import measure_edge_blur
-from iibr_core.depth.edges.fit import fit_to_blur
-from iibr_core.depth.edges.lone import fill_lone
 from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.training.degradation import blur
@@ -14,49 +12,6 @@ from iibr_core.training.scenes.raycast import render
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 from tests.iibr_core.depth.edges.test_refine import disc_before_slope
 from tests.iibr_core.scenes import smooth_texture
-
-RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
-NEAR, FAR, EDGE = 9.0, 2.0, 0.3
-
-
-def disc(size=64):
-    """Return a photo of a red disc before a blue wall, slightly noisy, and its disparity."""
-    y, x = np.mgrid[:size, :size]
-    inside = (x - size / 2) ** 2 + (y - size / 2) ** 2 < (size / 4) ** 2
-    photo = np.where(inside[..., None], RED, BLUE) + np.random.default_rng(5).normal(0, 0.01, (size, size, 3))
-    return photo.astype(np.float32), np.where(inside, NEAR, FAR).astype(np.float32)
-
-
-def test_lone_disparities_get_those_of_their_colour():
-    photo, truth = disc()
-    given = 0.5 * (truth + np.roll(truth, 1, axis=1))
-    filled, holes = fill_lone(photo, given, np.zeros(truth.shape, np.bool_), EDGE)
-    assert (np.abs(given - truth) > 1).sum() > 50
-    assert (np.abs(filled - truth) > 1).sum() == 0
-    assert (holes == (filled != given)).all()
-
-
-SIGMA, FIT_EDGE = 2.0, 0.12
-
-
-def scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a photo, its exact disparity and one with an outline that is wrong by a pixel, here and there."""
-    photo, exact, _ = disc_before_slope(120)
-    rng, places = np.random.default_rng(5), np.mgrid[:120, :120]
-    shifts = [np.rint(blur(rng.normal(size=(120, 120)).astype(np.float32), 1.0) * 4).clip(-1, 1) for _ in "yx"]
-    y, x = (places + shifts).clip(0, 119).astype(int)
-    return photo, exact, exact[y, x]
-
-
-def wrong_side(fitted: np.ndarray, exact: np.ndarray) -> int:
-    return int(np.count_nonzero((fitted > 1.2) != (exact > 1.2)))
-
-
-def test_ragged_outlines_become_whole() -> None:
-    photo, exact, start = scene()
-    fitted = fit_to_blur(photo, blur(exact, SIGMA), start, SIGMA, FIT_EDGE)
-    assert wrong_side(start, exact) > 80
-    assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,7 @@ import pytest
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.multi_view.all_views import estimate_all, matched_views, reconcile
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, find_confirmed
-from iibr_core.runtime.work import watched
-from iibr_core.training.scenes.random_scene import random_scene
-from iibr_core.training.scenes.raycast import render
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import GridShape, InputError, ViewOffset
 
 GRID = GridShape(5, 5)
 OFFSETS = [GRID.offset(*at) for at in np.ndindex(*GRID)]
@@ -146,19 +143,3 @@ def test_a_wrong_patch_takes_the_disparity_of_similar_colours():
     maps = [np.full((30, 40), 1.0, np.float32) for _ in LINE]
     maps[1][10:14, 10:14] = 5.0
     assert all((values == 1.0).all() for values in reconcile([np.full((30, 40, 3), 90, np.uint8)] * 3, maps, LINE))
-
-
-def test_maps_of_a_drawn_field_are_right_and_progress_reaches_its_total():
-    grid, size = GridShape(3, 3), ImageSize(96, 120)
-    offsets = [ViewOffset(2 * t, 2 * s) for t, s in (grid.offset(*at) for at in np.ndindex(*grid))]
-    scene = random_scene(np.random.default_rng(5), size, 2.0)
-    drawn = [render(scene, size, offset, samples=2) for offset in offsets]
-    views = [(255 * colors + 0.5).astype(np.uint8) for colors, _ in drawn]
-    reports = []
-    with watched(lambda *now: reports.append(now)):
-        maps = estimate_all(views, offsets, estimate_coarse(views, offsets, 4).range_px)
-    done, totals, _ = zip(*reports)
-    assert list(done) == sorted(done)
-    assert set(totals) == {done[-1]}
-    wrong = np.mean([np.abs(values - truth) > 0.25 for values, (_, truth) in zip(maps, drawn)])
-    assert wrong < 0.12

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from iibr_core.depth.multi_view.near_side import nearness_ratio
 from iibr_core.depth.multi_view.order_by_parallax import find_order
+from iibr_core.depth.multi_view.settle import UNSURE
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.order import Arrangement
 from iibr_core.formats.light_fields.views import in_order_of, read_views
@@ -98,6 +99,16 @@ def test_views_in_any_order_give_the_same_disparity(tmp_path: Path, name: str) -
     assert np.median(values[:, :20]) == pytest.approx(WALL_PX * step, abs=0.1)
     assert len(notes) == bool(note)
     assert all(found.endswith(note) for found in notes)
+
+
+def test_a_field_that_hides_nothing_leaves_the_near_side_open(tmp_path: Path) -> None:
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    for row, column in grid(3, 3):
+        shown = map_coordinates(textures()[0], [y + row - 1 + 40, x + column - 1 + 40], order=1).clip(0, 255)
+        Image.fromarray(shown.astype(np.uint8)).convert("RGB").save(tmp_path / f"lf_{column}_{row}.png")
+    _, values, notes = find_disparity(Source(str(tmp_path)))
+    assert np.abs(values[8:-8, 8:-8] - 1).max() < 0.1
+    assert notes == ("The parallax of 8 views shows their order: columns are counted before rows.", UNSURE)
 
 
 def test_what_the_user_says_about_the_order_counts(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.multi_view.all_views import carry, estimate_all
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_with_doubt
 from iibr_core.depth.multi_view.reduced import estimate_within_memory
+from iibr_core.runtime.work import watched
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, ViewUpdate
@@ -61,7 +62,12 @@ def test_maps_of_all_grids_are_what_they_were_and_near_the_truth(regenerate_gold
         maps += [values, np.where(is_doubtful, 1.5, -2.5)]
     maps += [found_and_truth(GRIDS["pair"], as_hdr)[0], found_and_truth(grid, as_hdr)[0], plain()]
     offsets, (views, truths) = [ViewOffset(*map(float, at)) for at in grid], drawn_field(grid)
-    every = estimate_all(views, offsets, (-3.0, 2.0))
+    reports: list[tuple[float, float, str]] = []
+    with watched(lambda *now: reports.append(now)):
+        every = estimate_all(views, offsets, (-3.0, 2.0))
+    done, totals, _ = zip(*reports)
+    assert list(done) == sorted(done)
+    assert set(totals) == {done[-1]}
     assert all((np.abs(values - truth) > 0.25).mean() < 0.25 for values, truth in zip(every, truths))
     small, notes = estimate_within_memory(views, offsets, 4, (-3.0, 2.0), max_pixels=48 * 60)
     assert notes == ("Found from views reduced to 60x48, then enlarged to 80x64 along the edges of the picture.",)
