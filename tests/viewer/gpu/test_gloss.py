@@ -7,10 +7,8 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.gloss.geometry import SceneGeometry
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.gloss.shading import make_gloss_maps, shade
-from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import open_field, open_views, rms
-from viewer.gpu.inspection_passes import InspectionPasses, Line
 
 GRID = GridShape(3, 3)
 WIDTH, HEIGHT = 96, 72
@@ -66,19 +64,3 @@ def test_other_viewpoints_are_the_cores_too(renderer, gloss, eye, row_step):
     renderer.field.row_step = row_step
     renderer.render(Optics(eye=eye, gloss=gloss), (WIDTH, HEIGHT))
     assert rms(renderer.read_image(), shaded(gloss, maps, photo, ViewOffset(row_step * eye.t, eye.s))) < 0.006
-
-
-@pytest.mark.parametrize(("gloss", "is_upright"), [(LIT, False), (METAL, True)])
-def test_an_epi_shows_every_views_gloss(renderer, gloss, is_upright):
-    photo, maps = open_flat(renderer, gloss)
-    passes = InspectionPasses(renderer.ctx, renderer.programs)
-    place, long, count = (34, WIDTH, GRID.columns) if not is_upright else (50, HEIGHT, GRID.rows)
-    line = Line(1, (place + 0.5) / (WIDTH if is_upright else HEIGHT), is_upright)
-    passes.draw_epi(renderer.field, line, ScreenSize(*((count, long) if is_upright else (long, count))), 1.0, gloss)
-    drawn = passes.read("upright" if is_upright else "across")[..., :3]
-    passes.release()
-    for index in range(count):
-        offset = GRID.offset(*((index, 1) if is_upright else (1, index)))
-        view = shaded(gloss, maps, photo, offset)
-        seen, expected = (drawn[:, index], view[:, place]) if is_upright else (drawn[index], view[place])
-        assert np.abs(seen.astype(int) - expected)[4:-4].max() <= 3

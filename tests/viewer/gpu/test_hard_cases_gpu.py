@@ -17,8 +17,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
-from tests.image_compare import ROUNDING, assert_close
-from tests.viewer.gpu.scenes import TwoPlanes, open_field, open_views, rms
+from tests.viewer.gpu.scenes import TwoPlanes, open_field, open_views
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height
@@ -36,15 +35,6 @@ def open_constant(renderer, disparity, size=SIZE):
     width, height = size
     values = np.where(np.arange(width) < width // 2, disparity, -disparity)
     open_views(renderer, GRID, np.full((height, width, 3), COLOR, np.uint8), values)
-
-
-def test_an_aperture_larger_than_the_grid_sees_all_views(renderer):
-    """Once it holds the whole grid, opening it further changes nothing but what lies beyond the stored views."""
-    SCENE.fill(renderer, GRID)
-    pictures = [picture(renderer, Optics(focus_disparity=2.0, aperture_diameter=d)) for d in (8.0, 1e3, 1e30)]
-    for image in pictures[1:]:
-        assert np.abs(image - pictures[1]).max() <= 1
-        assert rms(image.astype(np.uint8), pictures[0].astype(np.uint8), border=4) < 0.05
 
 
 @pytest.mark.parametrize("disparity", [0.0, 500.0, 3e38])
@@ -102,17 +92,6 @@ def test_float16_sums_of_289_views(renderer):
     assert np.abs(picture(renderer, optics, (8, 6)) - expected).max() <= 2
     linear = renderer.converged_picture(RenderSettings(replace(optics, exposure_stops=0.0), (8, 6), is_linear=True))
     assert linear == pytest.approx(float(linear_from_srgb(encoded)[0, 0, 0]), rel=2e-3)
-
-
-@pytest.mark.parametrize("with_disparity", [True, False])
-def test_a_grid_of_1x1(renderer, tmp_path, with_disparity):
-    """The photo through a pinhole; through a lens it stays a picture, of its own brightness."""
-    SCENE.fill(renderer, GridShape(1, 1), with_disparity)
-    photo = SCENE.view(ViewOffset(0.0, 0.0))[0]
-    assert_close(picture(renderer, Optics()).astype(np.uint8), photo, ROUNDING, tmp_path)
-    blurred = picture(renderer, Optics(aperture_diameter=3.0, focus_disparity=2.0))
-    light = linear_from_srgb(blurred / 255).mean() / linear_from_srgb(photo / 255).mean()
-    assert light == pytest.approx(1, abs=0.05)
 
 
 def test_a_one_pixel_wire(renderer):
