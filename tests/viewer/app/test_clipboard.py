@@ -3,6 +3,7 @@
 import subprocess
 from io import BytesIO
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -46,6 +47,17 @@ def test_old_pasted_pictures_go(display, tmp_path, monkeypatch):
     assert [Path(path).exists() for path in pasted] == [False] * 2 + [True] * MAX_PASTED
 
 
+FORMS = "{}", " {}\n", "'{}'", '"{}"', "file://{url}", "file://{url}\r\nfile:///other", "{}\nmore", "~/{name}"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_paths_are_taken_as_file_managers_and_terminals_copy_them(tmp_path, monkeypatch, form):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    path = tmp_path / "a photö 100%.png"
+    path.touch()
+    assert paste_picture(form.format(path, url=quote(str(path)), name=path.name)) == str(path)
+
+
 def test_pictures_and_paths_are_copied_and_pasted(open_window, photo_path, tmp_path, monkeypatch):
     """What is pasted at once waits until it is copied; words change nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -62,10 +74,9 @@ def test_pictures_and_paths_are_copied_and_pasted(open_window, photo_path, tmp_p
     with Image.open(viewer.app.state.source.path) as pasted:
         assert np.array_equal(np.asarray(pasted.convert("RGB")), copied)
     viewer.until_idle()
-    for name, form in (("other", "{}"), ("third", "file://{}\r\n")):
-        path = write_scene(tmp_path, name, seed=1)
-        put(form.format(path).encode())
-        viewer.key("ctrl+v", settle=lambda app, path=path: app.state.source.path == str(path))
+    path = write_scene(tmp_path, "other", seed=1)
+    put(str(path).encode())
+    viewer.key("ctrl+v", settle=lambda app: app.state.source.path == str(path))
     put(b"some words")
     before = viewer.app.state.source
     viewer.key("ctrl+v", until=says("neither a picture"))

@@ -161,7 +161,12 @@ def test_all_is_undone_done_again_and_there_again_after_a_crash(open_window, tmp
         driver.app.do(do(history.redo))
     driver.until_idle()
     assert_alike(at_rest(driver), left)
+    driver.do(do(viewpoint.set_loop, "circle"), until=lambda app: app.state.motion.turns > 0.05)
     driver.close()
+    again = open_window(path, kept_in=kept)
+    again.settle(says("as you left it"))
+    assert edited(again) == left[0], "where the motion began"
+    again.close()
     again = open_window(path, kept_in=crashed)
     again.settle(says("as you left it"))
     assert_alike(at_rest(again), left)

@@ -6,16 +6,19 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from PIL import Image
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
+from iibr_core.formats.images.metadata import camera_facts
+from iibr_core.formats.images.open_picture import read_metadata
 from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
-from viewer.app.picture_files import export_picture, inputs_of_scene, shot_of
+from viewer.app.picture_files import export_picture, inputs_of_scene, read_settings, shot_of
 from viewer.app.saving import checked_path
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
@@ -57,6 +60,17 @@ def test_exr_holds_light_finer_than_png(opened, tmp_path):
     encoded = srgb_from_linear(light) * 255
     assert np.abs(encoded - png).max() <= 0.51, "the same picture"
     assert np.mean(np.abs(encoded - np.rint(encoded)) > 0.05) > 0.5, "not rounded to 8 bits on the way"
+
+
+def test_a_saved_picture_states_how_its_photo_was_taken(opened, tmp_path):
+    exif, facts = Image.Exif(), (("Camera", "Maker"), ("Exposure", "1/60 s, ISO 200"))
+    exif[0x010F] = "Maker"
+    exif.get_ifd(0x8769).update({0x829A: 1 / 60, 0x8827: 200})
+    Image.new("RGB", (8, 8)).save(tmp_path / "taken.jpg", exif=exif)
+    state = replace(opened.state, source=replace(opened.state.source, path=str(tmp_path / "taken.jpg")))
+    out = export_picture(tmp_path / "a.png", opened.picture(), shot_of(state, opened.scene.size, PictureFormat()))
+    assert camera_facts(read_metadata(out)) == facts
+    assert read_settings(out).optics == opened.state.optics
 
 
 @pytest.mark.parametrize("what", ["picture", "map"])

@@ -14,7 +14,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import DEADLINE_S, rests, says
+from tests.viewer.conftest import DEADLINE_S, rests, says, shows, write_scene
 from viewer.app.session_store import MAX_SESSIONS, SessionStore, key_of
 from viewer.model import depth, lens, window
 from viewer.model.action import do
@@ -85,6 +85,16 @@ def test_a_photo_left_as_soon_as_its_session_is_found_keeps_it(open_window, phot
     store.keep(state)
     store.close()
     assert session.read_text("utf-8") == kept
+
+
+def test_a_photo_that_is_left_at_once_for_another_keeps_its_session(open_window, photo_path, tmp_path, monkeypatch):
+    monkeypatch.setattr("viewer.app.session_store.QUIET_S", 1e9)
+    driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE).until_idle()
+    change(driver)
+    assert not sessions_in(tmp_path / "kept"), "it waits until nothing changes"
+    driver.drop(write_scene(tmp_path, "other"), settle=shows("other"))
+    driver.until(lambda app: bool(sessions_in(tmp_path / "kept")))
+    assert key_of(Source(str(photo_path), grid=ONE)) == sessions_in(tmp_path / "kept")[0].stem
 
 
 def test_a_session_belongs_to_a_file_as_it_is_now(photo_path, tmp_path):

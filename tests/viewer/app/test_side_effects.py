@@ -14,6 +14,7 @@ from tests.viewer.model.told import EXACT, changes, title, words
 from viewer.app.side_effects import SideEffects
 from viewer.model import tasks
 from viewer.model.browsing import PathPrompt
+from viewer.model.demo_photo import demo_photo
 from viewer.model.tasks import ChooseTask, FocusTask, ListTask, PlainTask, TakePathTask
 
 KINDS = "photo", "mask", "map", "model"
@@ -23,7 +24,7 @@ ASKED = (
     *(TakePathTask(PathPrompt("photo", path)) for path in ("inner/", " ~/inner ", "inner/othr.png", "")),
     *(ListTask(PathPrompt(what, "inner/")) for what in KINDS),
     *(ListTask(PathPrompt("photo", path)) for path in ("", "~/", "gone/")),
-    *(PlainTask("read mask", name) for name in ("star.png", "dark.png", "gone.png")),
+    *(PlainTask("read mask", name) for name in ("~/star.png", "dark.png", "gone.png")),
     *(PlainTask("read facts", name) for name in ("photo.jpg", "scene.png", "gone.jpg")),
     PlainTask("list folder", "gone"), PlainTask("find recent"),
     *map(FocusTask, ((0.32, 0.0), (0.36, 0.0), (0.0, -0.47), (0.0, -0.55))),
@@ -62,11 +63,12 @@ def test_each_task_is_answered(folder, regenerate_golden):
         recent = (str(folder / "gone.png"), str(folder / "scene.png"))
         opened = replace(viewer.state, recent=recent)
         elsewhere = replace(opened, source=Source(str(folder / "inner" / "IMG_10.jpg")), scene=None)
-        for name, state in {
-            "open": opened,
-            "elsewhere": elsewhere,
-            "empty": replace(opened, source=None, scene=None),
-        }.items():
+        inner = replace(opened.preferences, opened_folder=str(folder / "inner"))
+        states = {
+            "open": opened, "elsewhere": elsewhere, "empty": replace(opened, source=None, scene=None),
+            "demo": replace(opened, source=Source(str(demo_photo())), preferences=inner),
+        }  # fmt: skip
+        for name, state in states.items():
             for task in ASKED:
                 state_now = replace(state, tasks=())
                 for action in answers(effects, state, task):

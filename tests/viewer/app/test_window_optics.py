@@ -1,15 +1,10 @@
 """The lens in a real window: viewpoint, clicks, tilt handles, racks, presets and undo; and what each edit costs."""
 
-import pytest
-
-from iibr_core.beyond.optics import ApertureShape, Optics
+from iibr_core.beyond.optics import ApertureShape
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import ViewOffset
-from tests.viewer.conftest import FAR, NEAR
 from viewer.model import lens, messages, preferences
 from viewer.model.action import do
-from viewer.model.focal_plane import handle_points, sharp_disparity
-from viewer.model.lens import TiltHandles
 from viewer.model.messages import Notice
 
 
@@ -33,33 +28,6 @@ def test_pad_loop_and_double_click_move_the_viewpoint(viewer, monkeypatch):
     viewer.send("mousemove", *viewer.position(0.1, 0.1), "click", "--repeat", 2, "--delay", 40, 1)
     viewer.settle(lambda app: app.state.optics.eye == ViewOffset(0, 0))
     assert app.state.optics.focus_disparity == kept.focus_disparity, "the first click is taken back"
-
-
-def test_two_clicks_are_racked_between_by_a_key(viewer):
-    app = viewer.app
-    near, far = map(viewer.field_disparity, (NEAR, FAR))
-    for place, wanted in (((0.5, 0.5), near), ((0.15, 0.15), far)):
-        viewer.send("mousemove", *viewer.position(*place))
-        viewer.until(lambda app, w=wanted: app.state.hover is not None and app.state.hover.disparity == w)
-        viewer.send("click", 1)
-        viewer.settle(lambda app, w=wanted: app.state.optics.focus_disparity == w)
-    viewer.key("x", until=lambda app: app.state.motion.kind == "rack" and app.state.optics.focus_disparity == near)
-    viewer.until(lambda app: app.state.motion.kind is None)
-    assert app.state.optics.focus_disparity == far
-
-
-def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer):
-    viewer.key("t", until=lambda app: app.state.tilt_handles is not None)
-    picture = viewer.app.layout().picture
-    (x, y), _ = handle_points(TiltHandles(), picture)
-    near = viewer.field_disparity(NEAR)
-    places = (round(x), round(y)), (round(x) + 20, round(y)), viewer.position(0.5, 0.5)
-    viewer.drag(*places, until=lambda app: sharp_disparity(app.state.optics, (0, 0)) == near)
-    optics = viewer.app.state.optics
-    assert optics.eye == ViewOffset(0, 0)
-    assert sharp_disparity(optics, TiltHandles().second) == pytest.approx(0, abs=1e-3), "the other one held"
-    viewer.key("Escape", until=lambda app: app.state.tilt_handles is None)
-    viewer.key("ctrl+z", until=lambda app: app.state.optics == Optics())
 
 
 DRAWS = (

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import SMALL_WINDOW
 from viewer.app import saving
-from viewer.model import inspection, lens, preferences
+from viewer.model import lens, preferences
 from viewer.model.action import do
-from viewer.model.inspection import sheet_cells
 from viewer.model.saving import SavePrompt
 from viewer.model.tasks import SaveTask, ask
 from viewer.model.viewpoint import FreeCamera
@@ -52,22 +50,6 @@ def test_before_is_the_photo_until_the_key_or_an_edit_ends_it(viewer):
     viewer.key("Right", until=lambda app: not app.state.shows_before)
 
 
-def test_a_snapshot_is_compared_side_by_side(viewer):
-    viewer.do(do(lens.set_aperture, 2.0))
-    before = viewer.image()
-    viewer.app.do(do(inspection.take_snapshot), do(lens.set_exposure, -0.5), do(inspection.compare, "snapshot"))
-    viewer.until(lambda app: app.inspection_view.is_drawing)  # over several turns: the window answers meanwhile
-    viewer.until_idle()
-    np.testing.assert_allclose(shown(viewer, "snapshot").astype(int), before, atol=2)
-
-
-def shown(viewer, name):
-    """What lies over the picture under this name."""
-    texture = viewer.app.inspection_view._passes._textures[name]
-    width, height = texture.size
-    return np.frombuffer(texture.read(alignment=1), np.uint8).reshape(height, width, -1)[..., :3]
-
-
 def test_epis_follow_the_pointer_and_cost_no_picture(viewer):
     viewer.key("e", settle=lambda app: app.state.inspection.shows_epis)
     app = viewer.app
@@ -85,36 +67,6 @@ def test_epis_follow_the_pointer_and_cost_no_picture(viewer):
     for _ in range(3):
         app.step()
     assert app.frames_shown == frames, "idle draws nothing"
-
-
-def test_a_click_on_the_sheet_goes_to_the_view_and_escape_leaves_it(viewer):
-    viewer.key("g", until=lambda app: app.state.inspection.shows_views)
-    picture = viewer.app.layout().picture
-    cell = sheet_cells(picture, viewer.app.state.scene.grid)[2]
-    viewer.send("mousemove", round(cell.x + cell.width / 2), round(cell.y + cell.height / 2), "click", 1)
-    viewer.settle(lambda app: app.state.optics.eye == ViewOffset(-1, 1))
-    assert viewer.app.state.optics == Optics(eye=ViewOffset(-1, 1)), "nothing was focused"
-    assert viewer.app.state.inspection.shows_views
-    viewer.key("Escape", until=lambda app: not app.state.inspection.shows_views)
-    assert not viewer.app.state.should_quit
-
-
-def test_the_divider_is_dragged_and_the_viewpoint_stays(viewer):
-    viewer.key("p", until=lambda app: app.state.inspection.comparison == "photo")
-    x, y = viewer.position(0.5, 0.7)
-    viewer.send("mousemove", x, y, "mousedown", 1)
-    viewer.app.step()
-    viewer.send("mousemove", x - 20, y)
-    viewer.app.step()
-    viewer.send("mousemove", *viewer.position(0.2, 0.7))
-    viewer.until(lambda app: abs(app.state.inspection.divider - 0.2) < 0.01)
-    assert viewer.app.state.inspection.divider_taken
-    viewer.send("mouseup", 1)
-    viewer.until(lambda app: not app.state.inspection.divider_taken)
-    assert viewer.app.state.optics == Optics()
-    viewer.send("mousemove", *viewer.position(0.2, 0.4), "click", 1)
-    viewer.until_idle()
-    assert viewer.app.state.optics == Optics(), "a click on the divider focuses nothing"
 
 
 def test_maps_and_values_come_and_tooltips_leave_a_dragged_slider_alone(viewer):
@@ -155,20 +107,6 @@ def test_a_surface_is_made_glossy_its_light_dragged_and_both_taken_back(viewer):
     viewer.send("key", "ctrl+z")
     viewer.key("ctrl+z", settle=lambda app: app.state.optics.gloss is None)
     assert np.array_equal(viewer.image(), plain)
-
-
-def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer):
-    make_glossy(viewer)
-    viewer.press("Only brush strokes")
-    viewer.press("Mark")
-    viewer.until_idle()
-    eye = viewer.app.state.optics.eye
-    places = viewer.position(0.3, 0.5), viewer.position(0.6, 0.5)
-    viewer.drag(*places, until=lambda app: len(app.state.optics.gloss.surface.strokes) == 1)
-    (stroke,) = viewer.app.state.optics.gloss.surface.strokes
-    assert stroke.points[0] == pytest.approx((0.3, 0.5), abs=0.02)
-    assert viewer.app.state.optics.eye == eye
-    viewer.key("Escape", until=lambda app: not app.state.gloss_brush.is_on)
 
 
 def seen(viewer):

@@ -6,7 +6,7 @@ import pytest
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import ViewOffset
-from tests.viewer.conftest import NEAR, says
+from tests.viewer.conftest import says
 from viewer.background.newest import Newest
 from viewer.model import lens, viewpoint
 from viewer.model.action import do
@@ -47,15 +47,6 @@ def test_wheel_keys_and_middle_button_zoom_and_pull_the_picture(viewer):
     assert frame_px.size == (96, 64)
     viewer.key("0", until=lambda app: app.state.zoom is None)
     assert app.state.optics == optics, "nothing else was moved"
-
-
-def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer):
-    zoom_to(viewer, Zoom(4 * viewer.app.layout().fit, (0.5, 0.5)))
-    viewer.until_idle()
-    frame = viewer.app.layout().frame
-    # At the left border of the frame: unzoomed, the far wall would be there.
-    viewer.send("mousemove", round(frame.x + 0.1 * frame.width), round(frame.y + frame.height / 2), "click", 1)
-    viewer.until(lambda app: app.state.optics.focus_disparity == viewer.field_disparity(NEAR))
 
 
 def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window, photo_path):

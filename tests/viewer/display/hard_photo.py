@@ -25,4 +25,4 @@ def write_hard_photo(folder):
     pixels += 4 * np.exp(-((x - 63) ** 2 + (y - 43) ** 2) / 18)[..., None]  # a lamp on the ball
     write_image(folder / "hard.exr", pixels.astype(np.float32))
     np.save(folder / "hard_disparity.npy", disparity)
-    return Source(str(folder / "hard.exr"), grid=GRID, max_pixels=WIDTH * HEIGHT // 4)
+    return Source(str(folder / "hard.exr"), grid=GRID, focus_disparity=0.5, max_pixels=WIDTH * HEIGHT // 4)
