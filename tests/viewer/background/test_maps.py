@@ -38,9 +38,11 @@ def test_a_selected_surface_is_shown_by_its_outline_also_where_the_brush_erased(
     clicked, found = Stroke("forward", ((0.5, 0.5),), 0.03, 0.1), []
     erased = Patch(((0.5, 0.5),), 0.1, erases=True)
     work = SurfaceWork()
-    for stroke in (clicked, replace(clicked, patches=(erased,))):
+    for stroke in (clicked, replace(clicked, patches=(erased,)), replace(clicked, points=((0.1, 0.1),))):
         work(SurfaceRequest(stroke, loaded, plan), found.append)
-    whole, cut = (surface.outline > 0 for surface in found)
+    whole, cut, wall = (surface.outline > 0 for surface in found)
+    assert (wall.any(), (wall & whole).any()) == (True, False)
+    assert found[2].range_px[1] < found[0].range_px[0], "another surface is found anew"
     rows, columns = np.nonzero(whole)
     assert (rows.min(), rows.max() + 1) == (HEIGHT // 4, 3 * HEIGHT // 4)
     assert (columns.min(), columns.max() + 1) == (WIDTH // 3, 2 * WIDTH // 3)

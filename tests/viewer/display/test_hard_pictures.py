@@ -50,11 +50,12 @@ LOOKS = {
         AWAY, *OPENED, do(inspection.take_snapshot), do(lens.reset), do(inspection.compare, "snapshot"),
         do(viewpoint.set_zoom, Zoom(2.5, (0.4, 0.45))), do(inspection.move_divider, 0.45), do(window.end_gesture),
     ),
+    "corner": (do(lens.move_eye, ViewOffset(1.0, 2.0)), do(inspection.set_overlay, "disparity")),
     "photo": (AWAY, do(lens.set_exposure, 1.0), do(inspection.compare, "photo")),
     "before": (AWAY, do(lens.set_exposure, 1.0), do(lens.show_before, True)),
     "selected": (AWAY, do(depth.set_brush, Brush("select", is_on=True)), do(selection.select, (0.5, 0.75))),
 }  # fmt: skip
-WITH_VALUES = "away", "epis, zoomed", "inpainted"
+WITH_VALUES = "away", "corner", "epis, zoomed", "inpainted"
 POINTERS = [(x, y) for y in (12.0, 24.5, 47.3) for x in (-1.0, 8.0, 22.6, 33.0, 52.4, 90.0)]
 
 

@@ -7,11 +7,13 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import MAKING, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens
+from viewer.model import inspection, lens
 from viewer.model.action import do
+from viewer.model.colormap import map_color
 
 
 @pytest.fixture
@@ -34,7 +36,10 @@ def test_tiny_photos_open(tmp_path, viewer, pixels):
     write_image(tmp_path / "tiny.png", pixels.astype(np.uint8))
     viewer.open(Source(str(tmp_path / "tiny.png")))
     np.testing.assert_array_equal(viewer.picture(), pixels)
-    assert viewer.screen((800, 600)).shape == (600, 800, 3)
+    viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
+    shown = viewer.screen(ScreenSize(800, 600))
+    assert shown.shape == (600, 800, 3)
+    assert shown[400, 244] == pytest.approx(np.multiply(map_color(0.5), 255), abs=2), "no depth is neither near nor far"
 
 
 @pytest.mark.parametrize(
