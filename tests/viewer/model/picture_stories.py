@@ -131,7 +131,7 @@ STORIES = {
         do(selection.paint, (0.5, 0.52), False, False), do(selection.paint, (0.6, 0.5), False, True),
         do(selection.move, is_forward=False), do(selection.deselect), do(selection.set_range, (1.0, 2.0)),
         do(selection.paint, (0.1, 0.2), False, True), do(selection.move, is_forward=True),
-        brush(tool="fill"),
+        brush(tool="fill"), do(selection.select, (0.5, 0.5)), do(selection.paint, (0.6, 0.5), False, False),
     )),
     "motions": (OPEN, (
         do(viewpoint.rack_focus), eye(1.0, -3.0), do(lens.set_dolly, 1.5), END, HOME,
@@ -143,6 +143,8 @@ STORIES = {
         do(viewpoint.move_camera, -9.0, 9.0, 9.0), do(viewpoint.move_camera, 0.0, 0.0, -9.0),
         do(viewpoint.report_camera, 0.5), do(saving.ask_to_save), do(viewpoint.leave_camera),
         do(viewpoint.move_camera, 0.1), HOME, do(viewpoint.move_camera, 0.1), RESET,
+        do(viewpoint.move_camera, 0.1), do(saving.ask_to_save), do(messages.show_prompt, None), RESET, END,
+        do(viewpoint.return_home, takes_back_click=True),
         do(viewpoint.set_zoom, Zoom(2.0, (0.3, 5.0))), do(viewpoint.set_zoom, Zoom(-2.0, (-1.0, 0.5))),
         do(inspection.set_hover, Hover(10.0, 20.0, 0.5)), do(viewpoint.set_zoom, None),
     )),

@@ -64,7 +64,7 @@ def test_what_lies_under_the_pointer_stays_there_while_one_zooms(notches):
     assert here == pytest.approx(there, abs=size[0] / after.picture.width)  # the picture lies on whole pixels
 
 
-@pytest.mark.parametrize("grid", [GridShape(1, 1), GridShape(3, 9), GridShape(16, 17)])
+@pytest.mark.parametrize("grid", [GridShape(1, 1), GridShape(3, 9), GridShape(9, 2), GridShape(16, 17)])
 def test_a_click_on_the_sheet_finds_the_view_drawn_there(grid):
     picture = Rect(12, 30, 600, 400)
     cells = sheet_cells(picture, grid)

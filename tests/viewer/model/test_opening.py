@@ -29,8 +29,8 @@ def state_with(scene):
 
 
 def test_recent_files_of_one_name_are_told_apart_by_their_folders():
-    paths = ("/a/x/boxes", "C:\\photos\\tree.jpg", "/a/y/boxes/views", "/boxes", "/b/field/views")
-    assert opening.names_of(paths) == ["boxes (x)", "tree.jpg", "boxes (y)", "boxes", "field"]
+    paths = ("/a/x/boxes", "C:\\photos\\tree.jpg", "/a/y/boxes/views", "/boxes", "/b/field/views", "/c/tree.jpg")
+    assert opening.names_of(paths) == ["boxes (x)", "tree.jpg (photos)", "boxes (y)", "boxes", "field", "tree.jpg (c)"]
     assert opening.with_recent(tuple("abcdefgh"), "c") == tuple("cabdefgh")
     assert opening.with_recent(tuple("abcdefgh"), "i") == tuple("iabcdefg"), "eight are kept"
 

@@ -69,6 +69,7 @@ def test_the_viewpoint_slows_down_towards_the_outermost_views_and_stays_there():
     steps = np.diff(eyes)
     assert np.all(np.diff(steps) <= 1e-12)
     assert eyes[15:] == [2.0] * len(eyes[15:])
+    assert [tracked(0j, complex(-cm)).optics.eye.s for cm in range(0, 40)] == [-eye for eye in eyes]
 
 
 @given(grids, st.floats(*HEAD_RANGE_LIMITS), st.floats(0.25, 4), st.complex_numbers(max_magnitude=1000))
