@@ -6,6 +6,7 @@ import sys
 from contextlib import contextmanager
 from dataclasses import replace
 
+import glfw
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -142,6 +143,17 @@ def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(vi
         wanted = woven("anaglyph", eyes, FIRST)
     assert psnr(alone, wanted) >= 45
     assert psnr(under_panel[:, :700], wanted[:, :700]) >= 45, "the panel lies over the picture"
+
+
+def test_the_window_fills_the_monitor_that_most_of_it_lies_on(viewer):
+    glfw.set_window_pos(viewer.app.window.handle, FIRST.width - 100, 30)
+    viewer.until(lambda app: [each.name for each in app.state.monitors] == ["DUMMY1", "DUMMY0"])
+    place = viewer.app.window.place
+    viewer.key("F11", settle=lambda app: app.window.is_fullscreen and app.window.size == SECOND)
+    assert glfw.get_window_pos(viewer.app.window.handle) == (FIRST.width, 0)
+    viewer.key("F11", settle=lambda app: not app.window.is_fullscreen)
+    assert viewer.app.window.place == place
+    assert stereo.monitor_of(viewer.app.state).name == "DUMMY0", "a stereo picture goes to the other one"
 
 
 def test_monitor_and_arrangement_are_remembered(open_window, photo_path, tmp_path):

@@ -81,7 +81,14 @@ def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer):
     viewer.until(lambda app: app.state.optics.focus_disparity > focus)
     viewer.key("Down", until=lambda app: app.state.optics.eye.t > 0)
     viewer.key("r", until=lambda app: app.state.optics == Optics())
-    viewer.key("Right", until=lambda app: app.state.optics.eye == ViewOffset(0, 0.5))
+    for key, eye in (
+        ("Right", (0, 0.5)),
+        ("Up", (-0.5, 0.5)),
+        ("Left", (-0.5, 0)),
+        ("Down", (0, 0)),
+        ("Right", (0, 0.5)),
+    ):
+        viewer.key(key, until=lambda app, eye=eye: app.state.optics.eye == eye)
     viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", "--repeat", 2, "--delay", 40, 1)
     viewer.until(lambda app: app.state.optics == Optics())
     viewer.send("key", "Escape")

@@ -3,6 +3,9 @@
 from contextlib import closing
 from threading import Event
 
+import numpy as np
+import pytest
+
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.models import cache
 from iibr_core.scenes.opening import results_of
@@ -10,7 +13,7 @@ from iibr_core.scenes.scene import SceneRequest, Source
 from iibr_core.types import CENTRE, GridShape
 from tests.iibr_core.depth.onnx_graphs import weighing
 from tests.viewer.conftest import reduce, write_scene
-from viewer.background.depth_models import DepthFinder
+from viewer.background.depth_models import DepthFinder, focus_before_and_now
 from viewer.model import depth_models, opening
 from viewer.model.action import do
 from viewer.model.app_state import AppState
@@ -23,6 +26,16 @@ def opened(state, source):
     state = reduce(state, do(opening.open_source, source))
     ready = next(results_of(SceneRequest(state.generation, source, asks_model=False), lambda: CENTRE))
     return reduce(state, do(opening.show_scene, ready.generation, ready.scene)), ready.loaded
+
+
+@pytest.mark.parametrize(
+    ("place", "row", "column"),
+    [((-1, -1), 0, 0), ((1, 1), 3, 4), ((0, 0), 2, 2), ((0.5, -0.3), 1, 3), ((-0.7, 0.3), 2, 0), ((9, -9), 0, 4)],
+)
+def test_the_place_in_focus_is_found_in_both_maps(place, row, column):
+    before = np.arange(20, dtype=np.float32).reshape(4, 5)
+    assert focus_before_and_now(before, -before, place) == (before[row, column], -before[row, column])
+    assert focus_before_and_now(before, -before, None) is None
 
 
 def test_an_estimate_that_comes_after_the_next_photo_was_asked_for_is_not_shown_with_it(tmp_path, monkeypatch):
