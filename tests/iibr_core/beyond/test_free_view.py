@@ -9,6 +9,7 @@ from iibr_core.beyond.free_view import render_free_view, target_from_photo
 from iibr_core.inpainting.background import fill_background
 from iibr_core.method.rays import NO_MARGINS, rays_of_photo
 from iibr_core.method.view import Renderer
+from iibr_core.runtime.work import watched
 from iibr_core.types import Camera, ImageSize, InputError, ViewOffset
 from tests.iibr_core.red_inpainter import paint_red
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -173,3 +174,14 @@ def test_a_camera_that_sees_nothing_of_the_photo_is_refused(target):
     pixels, inverse_depth = square_scene()
     with pytest.raises(InputError, match="test: sees nothing of the photo"):
         free_cameras.FreeViews(pixels, inverse_depth, camera(40, 48), [camera(40, 48), target])
+
+
+def test_a_slope_in_steps_is_closed_before_a_near_camera_and_the_work_is_reported():
+    rounded = np.round(np.tile(np.linspace(0.4, 1.0, 97), (40, 1)) / 0.018).astype(np.float32) * np.float32(0.018)
+    aside, said = camera(40, 97, place=(-0.9, 0.2, 0.2)), []
+    with watched(lambda *progress: said.append(progress)):
+        views = free_cameras.FreeViews(smooth_texture(40, 97), rounded, camera(40, 97), [aside])
+    assert not views.view(aside).inpainted[10:30, 22:90].any()
+    doing = "what cameras may see beside the photo's surfaces"
+    assert said == [(done, len(said), doing) for done in range(1, len(said) + 1)]
+    assert said
