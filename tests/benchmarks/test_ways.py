@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from benchmarks.compare import changes_table, compare, judge_view, main, mean_table, scene_table
-from benchmarks.guess import ordered_share, table
-from benchmarks.scenes import data_scenes, drawn_scene
+from benchmarks.disparity import judge
+from benchmarks.guess import known_maps, ordered_share, table
+from benchmarks.lens import FOCI, MARGIN, Judge, drawn
+from benchmarks.scenes import MAPS, data_scenes, drawn_scene
 from benchmarks.ways import chosen_ways
 from iibr_core.types import ImageSize, InputError
+from tests.golden_text import assert_same_text
 
 THIN_LENS = Path(__file__).parents[1] / "data" / "thin_lens"
 
@@ -44,17 +47,34 @@ def test_every_table_is_made_of_a_small_scene() -> None:
         changes_table(results, "splatting")
 
 
-def test_scenes_of_a_folder_are_judged_at_corners_and_sides(capsys) -> None:
-    names = [scene.name for scene in data_scenes(THIN_LENS, max_pixels=3000)]
-    assert names == ["fence", "shelf"]
+def test_scenes_of_a_folder_are_judged_at_corners_and_sides() -> None:
+    assert [scene.name for scene in data_scenes(THIN_LENS, max_pixels=3000)] == ["fence", "shelf"]
     (scene,) = data_scenes(THIN_LENS / "shelf", max_pixels=3000)
     assert len(scene.truth) == 8
     assert len(scene.field) == 25
     assert all(view.shape == scene.photo.shape for view in scene.truth.values())
-    main(["--data", str(THIN_LENS), "--only", "shelf", "--max-pixels", "3000", "--ways", "plain"])
-    assert "1 scenes: shelf.\n" in capsys.readouterr().out
     with pytest.raises(InputError, match="no scene"):
         main(["--data", str(THIN_LENS), "--only", "nothing"])
+
+
+def test_the_programs_print_what_they_printed(capsys, regenerate_golden) -> None:
+    """All but times."""
+    shelf = ["--data", str(THIN_LENS), "--only", "shelf", "--max-pixels", "3000"]
+    main([*shelf, "--ways", "iibr,plain,unchanged", "--maps", ",".join(MAPS), "--by", "scene"])
+    lines = capsys.readouterr().out.splitlines()
+    results = list(compare(data_scenes(THIN_LENS / "shelf", max_pixels=3000), chosen_ways("iibr,plain"), ["exact"]))
+    lines += [line.rpartition(" | ")[0] for line in mean_table(results).splitlines()]
+    lines += [line.rpartition("; x")[0] for line in changes_table(results, "plain warp").splitlines()]
+    lines += [" | ".join(judge(THIN_LENS / "shelf")[:-1])]
+    lines += table(known_maps(THIN_LENS, 3000)).splitlines()
+    layers = drawn(1)
+    shown = np.where(layers.opacity[2] > 0.5, 2, np.where(layers.opacity[1] > 0.5, 1, 0))[
+        MARGIN:-MARGIN, MARGIN:-MARGIN
+    ]
+    for focus in FOCI:
+        found = Judge(shown, layers.seen(12, focus), 12, focus)(layers.seen(8, 0))
+        lines.append(f"lens focused at {focus}: {found[0]:.2f}, {found[1]:.2f}")
+    assert_same_text(lines, "benchmarks", "programs", regenerate_golden)
 
 
 def test_a_guess_is_judged_by_the_order_of_its_points() -> None:
