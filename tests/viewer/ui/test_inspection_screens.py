@@ -10,7 +10,7 @@ from viewer.display.inspection_view import MASK_COLORS
 from viewer.model import depth, inspection, lens, messages, viewpoint
 from viewer.model.action import do
 from viewer.model.depth import Brush, DepthSample
-from viewer.model.inspection import Hover, beside_of, sheet_cells
+from viewer.model.inspection import Hover, beside_of
 from viewer.model.layout import Zoom, layout_of
 from viewer.model.messages import Notice
 from viewer.model.window import layout_for
@@ -75,16 +75,6 @@ def test_photo_and_result_on_the_two_sides_of_the_divider(viewer, zoom):
     assert np.abs(compared[right] - result[right]).max() <= 2
     assert np.median(np.abs(compared[left] - photo[left])) <= 2
     assert np.abs(compared[left] - result[left]).mean() > 2 * np.abs(compared[left] - photo[left]).mean()
-
-
-def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer):
-    viewer.do(do(inspection.show_views, True))
-    screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
-    for cell in sheet_cells(layout.picture, GRID):
-        assert part(screen, cell).std() > 5
-    changed = changed_after(viewer, do(lens.move_eye, ViewOffset(-1, 0)))
-    frames = [part(changed, cell).sum() for cell in sheet_cells(layout.picture, GRID)]
-    assert sorted(np.flatnonzero(frames)) == [1, 4]
 
 
 def test_the_status_line_is_not_covered_by_notices(viewer):

@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.depth.choice import DepthOrigin
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape
-from viewer.model import opening, preferences, window
+from viewer.model import opening, preferences
 from viewer.model.app_state import AppState
 from viewer.model.preferences import SECTIONS, with_sections
-from viewer.model.remedies import BETTER_DEPTH
 from viewer.model.saving import WRITING, JobProgress
 from viewer.model.window import DrawReport
 from viewer.ui.overlays.notice_corner import job_text
@@ -75,17 +73,6 @@ def test_every_section_opens_and_closes_by_its_heading(viewer, operated, built, 
     assert len(built) > closed_items
     closed = operated(opened, **{f"{section.capitalize()}###section {section.capitalize()}": True})
     assert closed.preferences.open_sections == before.preferences.open_sections
-
-
-def test_the_panel_tells_progress_drawing_notes_and_poor_depth(viewer, operated, built):
-    state = with_open(viewer.state, "depth", "scene")
-    state = opening.set_progress(state, state.generation, Progress(4, 9, 0.3))
-    state = window.set_report(state, DrawReport(3, 9, 12.0))
-    poor = DepthOrigin("rough", "rough, guessed without a model", ("The photo's own depth was not used.",))
-    scene = replace(state.scene, notes=("7.3 % of the map is unknown.",), depth_origin=poor)
-    operated(replace(state, scene=scene))
-    told = {"4 of 9 views", "Drawn in 12 ms, refining", "7.3 % of the map is unknown.", BETTER_DEPTH, *poor.failures}
-    assert told <= set(built.said())
 
 
 def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(operated, built):

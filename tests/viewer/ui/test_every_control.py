@@ -1,0 +1,99 @@
+"""Each control of each screen, used once: what a person sets is what the state gets. Golden texts tell the changes."""
+
+from dataclasses import replace
+
+import pytest
+
+from iibr_core.beyond.optics import ApertureShape
+from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.types import GridShape
+from tests.golden_text import assert_same_text
+from tests.viewer.conftest import reduce
+from tests.viewer.model.test_opening import plan_of, scene_of, state_with
+from tests.viewer.model.told import EXACT, changes
+from tests.viewer.ui.conftest import CONTROLS, SLIDERS
+from tests.viewer.ui.test_golden_screens import SCREENS, SOURCE, TALL
+from viewer.model import depth, inspection, lens, preferences, viewpoint
+from viewer.model.action import do
+from viewer.model.depth import Brush, DepthSample
+from viewer.model.lens import FIRST_GLOSS, GlossBrush
+from viewer.model.preferences import SECTIONS, Preferences, with_sections
+
+NINE = GridShape(9, 9)
+PLAN = replace(plan_of(NINE), reasons=("A reason.",))
+SCENE = scene_of(NINE, plan=PLAN, focal_px=50.0)
+SHARE = 0.3
+"""Where sliders are dragged to, as a share of their length."""
+GIVEN = {"input_text_with_hint": "b", "input_int": 7, "input_float": 1.5, "color_edit3": (0.5, 0.25, 0.125)}
+LEVEL = do(depth.set_brush, Brush("level", is_on=True, sample=DepthSample((0.5, 0.5), 1.0)))
+IN_PIXELS = (
+    do(preferences.set_units, "light field"), do(lens.set_focus_tilt, (0.4, -0.3)), do(inspection.compare, "photo"),
+    do(lens.set_aperture_shape, ApertureShape("ring")), do(lens.set_gloss, FIRST_GLOSS), LEVEL,
+    do(lens.paint_gloss, (0.5, 0.5), GlossBrush(), True), do(lens.set_focus, 1.5), do(viewpoint.set_loop, "circle"),
+    do(depth.set_tone, DepthEdits(gamma=2.0), True), do(inspection.set_overlay, "disparity"),
+)  # fmt: skip
+STATES = SCREENS | {"panel in pixels": (TALL, IN_PIXELS, {})}
+LEFT_OUT = "history.last", "history.gesture"
+"""Changes that a person does not see."""
+
+
+def state_of(scene, *actions):
+    """Return a state with every section of the panel open, after these actions."""
+    opened = Preferences(open_sections=with_sections((), *SECTIONS), shows_filmstrip=True)
+    state = replace(state_with(scene), preferences=opened, hides_panel=False)
+    for action in actions:
+        state = reduce(state, action)
+    return state
+
+
+def state_for(name):
+    """Return the state of a screen on a scene without pixels."""
+    size, actions, changed = STATES[name]
+    state, changed = state_of(SCENE, *actions), dict(changed)
+    scene = replace(SCENE, source=SOURCE, depth_origin=changed.pop("origin", None))
+    return replace(replace(state, scene=scene, source=SOURCE, hides_panel=size != TALL), **changed)
+
+
+def answer(item):
+    """Return what a person gives a control."""
+    if item.kind in SLIDERS:
+        low, high = item.ends
+        value = low + SHARE * (high - low)
+        return round(value) if item.kind == "slider_int" else value
+    return GIVEN.get(item.kind, True)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_each_control_does_what_it_says(operated, built, name, regenerate_golden):
+    size, before, lines = STATES[name][0], state_for(name), []
+    operated(before)
+    for item in [item for item in built if item.kind in CONTROLS and (item.window != "panel" or size == TALL)]:
+        given = {item.name: answer(item)}
+        for entry in entries_of(item, operated, built, before):
+            after = operated(before, **given, **dict.fromkeys(entry, True))
+            lines.append(" ".join((f"{item.window}: {item.name}", *entry, *shown_by(item, operated, built, after))))
+            lines += [f"    {line}" for line in changes(before, after) if not line.startswith(LEFT_OUT)]
+    assert_same_text(lines, "screens/controls", name, regenerate_golden, *EXACT)
+
+
+def entries_of(item, operated, built, state):
+    """Return the entries of a list, each by itself, and nothing for other controls."""
+    if item.kind != "begin_combo":
+        return [()]
+    closed = set(built.names("selectable", window=item.window))
+    operated(state, **{item.name: True})
+    return [(name,) for name in built.names("selectable", window=item.window) if name not in closed]
+
+
+def shown_by(item, operated, built, after):
+    """Return what a slider shows afterwards, and nothing for other controls."""
+    if item.kind not in SLIDERS:
+        return []
+    operated(after)
+    return [f"shows {now.words}" for now in built if (now.window, now.name) == (item.window, item.name)]
+
+
+def test_the_distance_of_the_focus_is_relative_to_what_stays_still(operated):
+    scene = replace(SCENE, plan=replace(PLAN, disparity_scale=0.5, disparity_zero=10.0))
+    after = operated(state_of(scene, do(preferences.set_units, "light field")), **{"##Distance": 0.8})
+    assert after.optics.focus_disparity == pytest.approx((10.0 / 0.8 - 10.0) * 0.5)
