@@ -14,6 +14,7 @@ from iibr_core.depth.models import cache
 from iibr_core.depth.models.catalog import LocalModel, known_model, model_here, model_to_use
 from iibr_core.depth.models.download import local_folder
 from iibr_core.depth.models.onnx import depth_output
+from iibr_core.depth.models.points import depth_of_points
 from iibr_core.depth.models.preparation import USUAL_PREPARATION, read_preparation
 from iibr_core.depth.search import estimator_of, find_depth, open_with_depth
 from iibr_core.formats.images.photo import focal_px_from_fov
@@ -266,6 +267,10 @@ def test_a_map_of_points_gives_metres_the_sky_and_the_focal_length(tmp_path) -> 
     np.testing.assert_allclose(found.values[mask > 0.5], metres[mask > 0.5], rtol=1e-3)
     assert (found.values[mask < 0.5] > 1000).all(), "the sky is far"
     assert found.focal_ratio == pytest.approx(focal_ratio, rel=1e-3)
+    relative = depth_of_points(points * brightest, mask < 0.5, None)
+    assert relative.meaning == "inverse depth"
+    np.testing.assert_allclose(relative.values, np.where(mask > 0.5, 1 / metres, 0), rtol=1e-3)
+    assert relative.focal_ratio == pytest.approx(focal_ratio, rel=1e-3)
     assert model_of(file).estimate(photo).focal_ratio == found.focal_ratio, "from the cache, too"
     write_image(tmp_path / "photo.png", (pixels * 255).astype(np.uint8))
     with_depth = open_with_depth(tmp_path / "photo.png", DepthChoice("model", model=str(file)))

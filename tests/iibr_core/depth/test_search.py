@@ -7,7 +7,7 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.depth.sidecar import map_to_read
+from iibr_core.depth.sidecar import find_sidecars, map_to_read
 from iibr_core.remedies import Remedy, remedy_of
 from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
@@ -54,7 +54,11 @@ def test_the_order_file_embedded_rough(tmp_path) -> None:
     (tmp_path / "scene_depth.png").write_bytes(files.picture(DEPTH, "PNG"))
     both = open_with_depth(path, start_from("auto"))
     assert both.disparity.notes[0] == "Only scene_disparity.npy counts; not used: scene_depth.png."
+    (tmp_path / "depth").mkdir()
+    (tmp_path / "depth" / "scene.png").write_bytes(files.picture(DEPTH, "PNG"))
+    assert [file.name for file in find_sidecars(path)] == ["scene_disparity.npy", "scene_depth.png", "scene.png"]
     (tmp_path / "scene_depth.png").unlink()
+    (tmp_path / "depth" / "scene.png").unlink()
     assert map_to_read(path, start_from("auto")) == tmp_path / "scene_disparity.npy"
     assert map_to_read(path, start_from("rough")) is None
     assert map_to_read(path, start_from("rough", file="a.png")) == Path("a.png")

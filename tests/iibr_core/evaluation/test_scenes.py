@@ -101,6 +101,19 @@ def test_a_map_is_carried_to_the_corner(tmp_path) -> None:
     np.testing.assert_allclose(found.values, wanted, atol=1e-5)
 
 
+def test_the_view_with_a_map_nearest_to_the_centre_is_given(tmp_path) -> None:
+    folder = write_grid(tmp_path / "square", 5)
+    for name in ("u00_v00", "u03_v02"):
+        np.save(folder / f"gt_disp_{name}.npy", disparity_of_square())
+    (folder / "gt_disp_u02_v02.npy").unlink()
+    for source, name in (("given", "v02 u03"), ("estimate", "v02 u02")):
+        scene = scene_of(folder)
+        centre, corner = trials_of(scene, source)
+        assert scene.views[centre.given].name == name
+        assert len(centre.judged) == 24
+        assert (scene.views[corner.given].name, corner.offset(corner.judged[0])) == ("v04 u00", (-4, 0))
+
+
 @pytest.mark.parametrize(
     ("damage", "named"),
     [
