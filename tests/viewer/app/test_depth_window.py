@@ -56,7 +56,9 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer):
     viewer.settle(is_made)
     np.testing.assert_array_equal(disparity_of(viewer.app), given, "Escape takes a stroke back")
     assert len(viewer.app.state.history.past) == 1
-    generation = viewer.app.state.generation
+    generation, plan = viewer.app.state.generation, viewer.app.state.scene.plan
+    viewer.do(do(lens.set_focus, (NEAR - plan.disparity_zero) * plan.disparity_scale), do(window.end_gesture))
+    before = viewer.image()
     press_at(viewer, 0.5, 0.5)
     viewer.until(lambda app: not np.array_equal(app.scene_view.renderer.read_image(), before))
     previews = viewer.app.scene_view.previews
@@ -69,6 +71,8 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer):
     assert viewer.app.scene_view.field.present.sum() == 9
     made = disparity_of(viewer.app)
     assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
+    focus = viewer.app.state.optics.focus_disparity
+    assert focus == viewer.field_disparity(NEAR), "the depth that was in focus, not its share of the new range"
     far = given == FAR
     np.testing.assert_array_equal(made[far], given[far], "the red square's contour holds the stroke")
     viewer.send("key", "ctrl+z")

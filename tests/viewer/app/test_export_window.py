@@ -4,6 +4,7 @@ import threading
 from dataclasses import replace
 
 import glfw
+import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
@@ -171,6 +172,20 @@ def test_an_export_asked_for_right_after_an_edit_of_the_depth_shows_it(viewer, t
         app.do(*actions, export("gif", out))
         viewer.settle(says(f"Exported {out}"))
     assert bytes_of(before) != bytes_of(early) == bytes_of(late)
+
+
+def test_a_rack_goes_from_the_last_click_but_one_to_the_last(viewer, tmp_path):
+    """Two clicks side by side: nearly a still picture. Without clicks, it goes through all depths."""
+    moved = []
+    for name, clicks in (("all", ()), ("near", (do(lens.focus_on, (0, 0), 0.0), do(lens.focus_on, (0, 0), 0.02)))):
+        out = tmp_path / f"{name}.gif"
+        viewer.app.do(do(lens.set_aperture, 3.0), *clicks, export("gif", out, replace(SMALL, motion="rack")))
+        viewer.settle(says(f"Exported {out}"))
+        with Image.open(out) as image:
+            frames = [np.asarray(frame.convert("L"), float) for frame in ImageSequence.Iterator(image)]
+        moved.append(max(np.abs(frame - frames[0]).mean() for frame in frames))
+    assert moved[0] > 2
+    assert moved[1] < 0.5
 
 
 def test_the_list_of_exports_cancels_each_and_repeats_one(viewer, tmp_path, gate):

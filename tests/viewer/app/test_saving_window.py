@@ -17,7 +17,7 @@ from tests.viewer.conftest import HEIGHT, WIDTH, says, write_scene
 from viewer.app.jobs import Jobs
 from viewer.app.picture_files import export_picture, read_settings
 from viewer.app.saving import OPEN_PHOTO
-from viewer.model import lens, messages, saving
+from viewer.model import lens, messages, saving, viewpoint
 from viewer.model.action import do
 from viewer.model.saving import WRITING, SavePrompt
 from viewer.model.tasks import PlainTask, SaveTask, ask
@@ -196,6 +196,19 @@ def test_a_picture_is_saved_at_the_photos_own_size(large, photo_path, tmp_path, 
     shown = linear_from_srgb(shown / np.float32(255))
     smaller = mean_of_areas(linear_from_srgb(saved), image_size(shown))
     assert np.abs(smaller - shown).mean() < 0.01
+
+
+def test_a_free_cameras_picture_is_the_windows_at_any_size(large, tmp_path):
+    app, out = large.app, tmp_path / "out.png"
+    large.do(do(viewpoint.move_camera, 0.2, 0.1, 0.2), until=lambda app: app.free_camera_view.shown is not None)
+    large.until_idle()
+    shown = large.red_place()[0] / large.image().shape[1], large.red_place()[1] / large.image().shape[0]
+    app.do(save(out, ScreenSize(WIDTH, HEIGHT)))
+    large.until(says(f"Saved {out}"))
+    saved = read_photo(out).pixels
+    rows, columns = np.nonzero(saved[..., 0] > saved[..., 1] + 60 / 255)
+    assert (columns.mean() / WIDTH, rows.mean() / HEIGHT) == pytest.approx(shown, abs=0.02)
+    assert shown[0] < 0.45, "the camera looks aside"
 
 
 def test_a_photo_that_was_replaced_meanwhile_is_noticed(large, photo_path, tmp_path):

@@ -224,7 +224,7 @@ def test_a_wrong_ending_keeps_what_was_typed_and_a_problem_moves_neither_the_pro
     assert places[0] == places[1]
 
 
-def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer):
+def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer, monkeypatch):
     heights = []
     for number in range(3):
         viewer.do(do(messages.notify, Notice(f"Notice {number}, as long as the others are.")))
@@ -232,9 +232,12 @@ def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer):
     assert heights[2] == heights[1], "they do not pile up"
     viewer.press("Close all (3)", "notices", until=lambda app: not app.state.notices)
     viewer.do(do(messages.notify, Notice("A message that goes with the first click.")))
-    viewer.find("×", "notices")
-    viewer.send("click", "--repeat", 2, "--delay", 200, 1)
-    viewer.settle(lambda app: not app.state.notices)
+    monkeypatch.setattr("viewer.app.pointer.PANEL_CLICK_S", 60.0)
+    viewer.press("×", "notices", until=lambda app: not app.state.notices)
+    for button, is_down in (("mousedown", True), ("mouseup", False)):
+        viewer.send(button, 1)
+        viewer.until(lambda app, is_down=is_down: imgui.get_io().mouse_down[0] == is_down)
+    viewer.until_idle()
     assert viewer.app.state.focused_at is None, "a double click on a message never reaches the picture"
     assert not viewer.app.state.history.past
 

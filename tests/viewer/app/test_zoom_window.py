@@ -57,6 +57,11 @@ def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window
     assert sharp.shape == photo.shape
     assert np.abs(sharp - photo).max() <= 1
     assert np.abs(viewer.image().astype(int) - photo).mean() > 3, "the views hold less"
+    app.do(do(viewpoint.move_camera, 0.2))
+    viewer.settle(lambda app: app.free_camera_view.shown is not None)
+    assert app.sharpener.pixels is None, "the photo's own pixels would hide what the camera sees"
+    app.do(do(viewpoint.leave_camera))
+    until_sharp(viewer)
     app.do(do(lens.move_eye, ViewOffset(0.0, 0.5)))
     viewer.until(lambda app: app.sharpener.pixels is None)
     assert np.abs(until_sharp(viewer) - viewer.image()).mean() < 12
