@@ -6,7 +6,6 @@ from hypothesis.extra import numpy as stn
 
 from iibr_core.method.candidates import SLOTS, find_candidates
 from iibr_core.method.occlusion import entropy
-from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.method.ray_sets import ray_set
 
@@ -25,26 +24,12 @@ def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them
     assert (opened.number[:, 1:3] == 0).all()
 
 
-def test_two_surfaces_make_two_candidates_however_many_rays_land():
-    foreground, background = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(background, foreground, farthest=3.0), ViewOffset(0.0, 1.0), (0, 6))
-    assert (found.number[:, :7] == 2).all()
-    assert {*found.source[:2, 3, 3]} == {0, 1}
-
-
 def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
     foreground, background = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
     found = find_candidates(ray_set(foreground, background, farthest=3.0), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.source[0, :, :7] == 0).all()
     assert (found.number[:, :7] == 1).all()
     assert (found.source[0, :, 8] == 1).all(), "the foreground has moved away"
-
-
-def test_surfaces_closer_than_the_tolerance_are_one():
-    columns = np.arange(8)
-    for near in (np.where(columns % 2, 1.0, 1.0 + 0.9 * SAME_SURFACE_PX / 2), np.where(columns < 4, 1.0, 1.0001)):
-        found = find_candidates(ray_set(np.tile(near, (4, 1)), farthest=3.0), ViewOffset(0.0, 2.0), (0, 4))
-        assert (found.number[:, :5] == 1).all()
 
 
 def test_the_rearmost_gives_way_where_slots_run_out():
@@ -62,14 +47,6 @@ def test_bands_do_not_change_what_is_found():
         assert (band.number == whole.number[first:last]).all()
         assert (used(band, band.coverage) == used(whole, whole.coverage)[:, first:last]).all()
         assert (used(band, band.disparity) == used(whole, whole.disparity)[:, first:last]).all()
-
-
-def test_rays_without_coverage_do_not_land():
-    coverage = np.zeros((5, 5), np.float32)
-    coverage[2, 2] = 0.25
-    found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage, farthest=3.0), ViewOffset(0.0, 1.0), (0, 5))
-    assert found.number.sum() == 1
-    assert found.coverage[0, 2, 2] == pytest.approx(0.25)
 
 
 def entropy_in_doubles(weights):

@@ -63,15 +63,6 @@ def test_plans_and_their_words(name, regenerate_golden):
     assert_same_text(lines, "core/plans", name, regenerate_golden, 1e-4, 1e-4)
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-def test_parallax_is_a_share_of_the_width_whatever_the_units(scale):
-    photo, disparity = square_before_wall(60, 500)
-    plan = plan_for_viewing(photo, disparity_of(disparity.values * scale))
-    low, high = plan.disparity_range_px
-    assert (high - low) * (plan.grid.columns - 1) == pytest.approx(TOTAL_PARALLAX * 500, rel=1e-3)
-    assert plan.has_disocclusion
-
-
 def test_what_cannot_be_planned_is_refused():
     for strength in (float("nan"), float("inf"), 101.0):
         with pytest.raises(InputError, match="depth strength"):
