@@ -108,7 +108,9 @@ def test_fields_that_lack_views_or_room_get_none_between(tmp_path, monkeypatch):
         (star / "views" / f"v{v:02d}_u{u:02d}.png").unlink()
     with pytest.raises(InputError, match=r"star.*: only 5 of 9 views are there; get the others"):
         iibr.open(star).light_field((5, 5))
-    whole = iibr.open(write_grid(tmp_path / "whole"))
+    whole, said = iibr.open(write_grid(tmp_path / "whole")), []
+    whole.light_field((5, 5), report_progress=lambda *progress: said.append(progress))
+    assert [each for each in said if each[2] == "reading views"] == [(n, 9, "reading views") for n in range(1, 10)]
     monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * 40 * 48 * 9 * 60 - 2)
     with pytest.raises(InputError, match=r"making views between 3x3 of whole \(48x40\) takes 1 MiB"):
         whole.light_field((5, 5))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.beyond.lens_slices import disc_taps, slices_of
+from iibr_core.beyond.lens_slices import MAX_SLICES, disc_taps, slices_of
 from iibr_core.beyond.optics import ApertureShape
 
 
@@ -23,3 +23,10 @@ def test_a_reduced_disc_is_as_wide_as_asked_for(diameter_px):
 
 def test_a_disc_at_full_size_has_no_negative_weights():
     assert disc_taps(ApertureShape("polygon", blades=5), 9.0, False)[:, 2].min() > 0
+
+
+def test_however_much_is_blurred_there_are_few_slices():
+    slices = [each.diameter_px for each in slices_of(np.linspace(-900, 800, 5000), ApertureShape())]
+    assert 16 < len(slices) <= MAX_SLICES
+    assert slices == sorted(slices, reverse=True)
+    assert 0.0 in slices

@@ -64,7 +64,7 @@ def test_plans_and_their_words(name, regenerate_golden):
 
 
 def test_what_cannot_be_planned_is_refused():
-    for strength in (float("nan"), float("inf"), 101.0):
+    for strength in (float("nan"), float("inf"), 101.0, -101.0):
         with pytest.raises(InputError, match="depth strength"):
             plan_for_viewing(*WIDE, PlanOverrides(depth_strength=strength))
     for empty in (GridShape(0, 3), GridShape(3, 0)):
@@ -90,6 +90,9 @@ def test_less_memory_gives_fewer_views(monkeypatch):
     assert plan_for_viewing(photo, disparity).grid == roomy.grid, "just enough"
     monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * needed - 2)
     assert plan_for_viewing(photo, disparity).grid.columns < roomy.grid.columns
+    monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * scene_bytes(300 * 800, 2 * 7 * 300 * 800))
+    with pytest.raises(InputError, match="3 x 3 views of test"):
+        plan_for_viewing(photo, disparity)
     monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2000)
     with pytest.raises(InputError, match=r"takes \d+ MiB, half of the free memory is 1 MiB"):
         plan_for_viewing(photo, disparity)

@@ -6,9 +6,10 @@ from iibr_core.formats.weights import save_weights
 from iibr_core.method.ambiguous_rays import (
     FEATURES,
     HYPOTHESES,
+    SHARE,
     AmbiguousRays,
 )
-from iibr_core.method.ray_transformer import TrainedWeights
+from iibr_core.method.ray_transformer import MIN_PRIOR, TrainedWeights
 from iibr_core.training.model import RayTransformer
 from iibr_core.types import InputError, ViewOffset
 
@@ -60,6 +61,13 @@ def test_compiled_weights_are_those_of_the_model_and_sum_to_one(model, compiled,
             assert found.sum(axis=1) == pytest.approx(1, abs=1e-5)
             assert (found[~ambiguous.mask] == 0).all()
             assert found.min() >= 0
+
+
+def test_training_starts_as_the_closed_form():
+    ambiguous = random_ambiguous()
+    prior = (np.clip(ambiguous.features[..., SHARE], 0, 1) + MIN_PRIOR) * ambiguous.mask
+    expected = prior / prior.sum(axis=1, keepdims=True)
+    assert weights_of(RayTransformer().eval(), ambiguous) == pytest.approx(expected, abs=1e-6)
 
 
 def test_weights_of_a_ray_do_not_depend_on_the_others_nor_on_the_order_of_hypotheses(model, compiled):

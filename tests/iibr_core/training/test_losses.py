@@ -72,6 +72,7 @@ def test_total_is_the_weighted_sum_over_the_first_rays_as_epis():
     assert losses.epi == epi_loss(*map(torch.from_numpy, epis))
     expected = 5 * color_loss(rendered, truth) + 7 * entropy_loss(weights) + 11 * losses.epi
     assert losses.total.item() == pytest.approx(expected.item(), rel=1e-12)
+    assert total_loss(rendered, truth, weights, None, LossWeights()).epi == 0
 
 
 @pytest.fixture(scope="module", autouse=True)
