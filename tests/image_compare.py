@@ -30,7 +30,7 @@ SAME_RASTERISER = Tolerance(2, 0.002, 24)
 """Golden images: another version of the software rasteriser may decide a depth edge differently here and there."""
 DECISIONS = Tolerance(2, 0.002, 255)
 """Golden maps: another processor may give a pixel here and there to the other side of an edge."""
-MATCHED = Tolerance(3, 0.01, 255)
+MATCHED = Tolerance(4, 0.03, 255)
 """Golden maps of matched views: rounding decides between matches of nearly equal cost at more pixels."""
 
 DEPTH_EDGES = Tolerance(2, 0.004, 255)
