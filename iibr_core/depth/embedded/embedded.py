@@ -21,7 +21,7 @@ from iibr_core.depth.embedded.google import (
     range_notes,
 )
 from iibr_core.depth.embedded.images import PICTURE_STARTS, decode_map
-from iibr_core.depth.embedded.jpeg import HEADER_BYTES, JPEG_START, appended_pictures, jpeg_layout, xmp_of
+from iibr_core.depth.embedded.jpeg import HEADER_BYTES, appended_pictures, jpeg_layout, xmp_of
 from iibr_core.depth.embedded.trailers import (
     huawei_estimate,
     samsung_estimate,
@@ -166,7 +166,7 @@ def _read_sharp(data: bytes, orientation: int, max_pixels: int) -> Photo:
     if not data.startswith(PICTURE_STARTS):
         raise InputError(f"the all-in-focus picture is neither a PNG nor a JPEG picture ({len(data):,} bytes)")
     with tempfile.TemporaryDirectory(prefix="iibr-") as folder:
-        path = Path(folder, "picture.jpg" if data.startswith(JPEG_START) else "picture.png")
+        path = Path(folder, "picture")
         path.write_bytes(data)
         try:
             sharp = read_photo(path, max_pixels, keeps_primaries=True)

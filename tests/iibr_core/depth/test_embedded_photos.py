@@ -174,7 +174,7 @@ ROWS = {
     "gdepth, avif": Row("a.avif", lambda s: in_packet(s, "AVIF")),
     "gdepth with a sharp picture, small": Row(
         "a.jpg",
-        lambda s: gdepth(s, photo=s.blurred, sharp=files.picture(s.pixels)),
+        lambda s: gdepth(s, photo=s.blurred, sharp=png(s.pixels), part_bytes=50_000),
         6, options={"max_pixels": 80 * 120},
     ),
     "gdepth before a sharp picture": Row("a.jpg", lambda s: gdepth(s, photo=s.blurred) + s.photo, 6),
