@@ -162,6 +162,11 @@ def test_an_export_asked_for_before_its_views_are_there_outlives_its_photo(open_
     app.do(do(messages.dismiss), do(lens.set_aperture, 2.0), export("gif", late))
     viewer.until(says(f"Exported {late}"))
     assert bytes_of(early) == bytes_of(late)
+    app.do(do(opening.open_source, Source(str(photo_path), grid=GridShape(5, 5))))
+    viewer.until(lambda app: app.state.scene.source is app.state.source and app.state.progress.done > 0)
+    app.do(do(opening.stop), do(lens.set_aperture, 2.0), export("gif", tmp_path / "stopped.gif"))
+    viewer.until(says("stopped.gif"))
+    assert bytes_of(tmp_path / "stopped.gif") == bytes_of(late), "it makes the views that were not made"
 
 
 def test_an_export_asked_for_right_after_an_edit_of_the_depth_shows_it(viewer, tmp_path):
