@@ -43,7 +43,8 @@ def require_golden(facts: dict[str, Any], name: str, levels: float, is_regenerat
         lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(fact)}" for name, fact in facts.items())
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{{\n{lines}\n}}\n", "utf-8")
-    assert not list(differences(facts, json.loads(path.read_text("utf-8")), levels))
+    problems = list(differences(facts, json.loads(path.read_text("utf-8")), levels))
+    assert not problems, "\n".join(problems)
 
 
 def _plain(value: Any) -> Any:

@@ -64,7 +64,7 @@ ROWS = [
     Row("photo", "spatial-photo", "b.heic", {}, {"size": ScreenSize(96, 64), "eyes": 2.0}, 5),
     Row("field", "mp4", "a.mp4", {"focus": 0.3, "aperture": 0.5}, {"keys": KEYS, "frames": 6, "rate": 12.0}, 5),
     Row("photo", "webm", "b.webm", {}, {"motion": "eight", "frames": 8, "rate": 7.5, "size": ScreenSize(64, 32)}, 5),
-    Row("field", "gif", "a.gif", {"aperture": 3.0}, {"motion": "rack", "rack": (2.0, -1.5), "frames": 5}, 8),
+    Row("field", "gif", "a.gif", {"aperture": 3.0}, {"motion": "rack", "rack": (9.0, -1.5), "frames": 5}, 8),
     Row("photo", "gif", "b.gif", {}, {"motion": "circle", "frames": 12, "rate": 100.0}, 8),
     Row("field", "webp", "a.webp", {"aperture": 1.0}, {"motion": "focus", "frames": 4, "rate": 9.0}, 5),
     Row("photo", "webp", "b.webp", {"focus": 0.4}, {"motion": "aperture", "frames": 24, "rate": 240.0}, 5),
