@@ -183,11 +183,11 @@ def lens(tab: Tab) -> list[float]:
     return values
 
 
-def move_hand(tab: Tab, x: float, y: float, trigger: int) -> None:
-    """Move the right hand, which points straight ahead, beside the window's middle, m."""
+def move_hand(tab: Tab, x: float, y: float, trigger: int, hand: str = "right") -> None:
+    """Move a hand, which points straight ahead, beside the window's middle, m."""
     tab.evaluate(
         f"(hand => {{ hand.connected = true; hand.position.set({x}, {START_M[1] + y}, 0);"
-        f" hand.updateButtonValue('trigger', {trigger}); }})(headset.controllers.right)"
+        f" hand.updateButtonValue('trigger', {trigger}); }})(headset.controllers.{hand})"
     )
     wait_for_frames(tab)
 
@@ -209,6 +209,13 @@ def test_a_hand_focuses_where_it_points_and_opens_the_aperture(worn) -> None:
     move_hand(worn, 0.0, 0.0, trigger=1)
     left, _ = eyes_at(worn, POSES[0])
     assert left[EYE_PX // 2, EYE_PX // 2 + round(edge / 2)].min() > 200, "a dot"
+    move_hand(worn, -0.3, 0.15, trigger=0, hand="left")
+    _, right = eyes_at(worn, POSES[0])
+    for place in ((0.0, 0.0, 0.0), (-0.3, 0.15, 0.0)):
+        ((x, y),) = np.floor(POSES[0].pixels(np.array([place]), 1)).astype(int)
+        assert right[y, x].min() > 200, "a dot for each hand"
+        assert right[y - 4 : y + 5, [x - 4, x + 4]].min(axis=-1).max() < 200, "a small one"
+    worn.evaluate("headset.controllers.left.connected = false")
     move_hand(worn, 0.0, 0.2, trigger=1)
     opened = lens(worn)
     assert opened[1] > aperture

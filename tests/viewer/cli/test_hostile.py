@@ -154,6 +154,9 @@ COMMANDS = {
     # outputs are refused before the photo is read
     "screenshot text.jpg -o o.gif": "o.gif: can be written as .png, .jpg, .jpeg, .tif, .tiff, .exr, .webp, .avif only",
     "screenshot text.jpg -o o.jpg --bits 16": "o.jpg: JPEG is written with 8 bits a channel, not 16",
+    "screenshot text.jpg -o o.png --depth-model gone.onnx": "gone.onnx",
+    "export text.jpg --to epi -o cut.png": "cut.png: already exists",
+    "evaluate data -o o --depth-model gone.onnx": "gone.onnx",
     "screenshot text.jpg -o none/o.png": "the folder none does not exist",
     "screenshot text.jpg -o o.png --size 16384x16384": "16384x16384 px",
     f"generate text.jpg --grid 3 -o {'n' * 299}": "File name too long",
