@@ -1,12 +1,14 @@
 """Each control of each screen, used once: what a person sets is what the state gets. Golden texts tell the changes."""
 
+import math
 from dataclasses import replace
 
 import pytest
+from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import ApertureShape
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.types import GridShape
+from iibr_core.types import GridShape, ViewOffset
 from tests.golden_text import assert_same_text
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
@@ -18,6 +20,10 @@ from viewer.model.action import do
 from viewer.model.depth import Brush, DepthSample
 from viewer.model.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.preferences import SECTIONS, Preferences, with_sections
+from viewer.model.window import layout_for
+from viewer.ui.host import UiHost
+from viewer.ui.screen import build_screen
+from viewer.ui.style import Look
 
 NINE = GridShape(9, 9)
 PLAN = replace(plan_of(NINE), reasons=("A reason.",))
@@ -69,28 +75,61 @@ def test_each_control_does_what_it_says(operated, built, name, regenerate_golden
     operated(before)
     for item in [item for item in built if item.kind in CONTROLS and (item.window != "panel" or size == TALL)]:
         given = {item.name: answer(item)}
-        for entry in entries_of(item, operated, built, before):
-            after = operated(before, **given, **dict.fromkeys(entry, True))
-            lines.append(" ".join((f"{item.window}: {item.name}", *entry, *shown_by(item, operated, built, after))))
+        for entry, mark in entries_of(item, operated, built, before).items():
+            after = operated(before, **given, **({entry: True} if entry else {}))
+            lines.append(f"{item.window}: {item.name} {entry}{mark}{shown_by(item, operated, built, after)}".rstrip())
             lines += [f"    {line}" for line in changes(before, after) if not line.startswith(LEFT_OUT)]
     assert_same_text(lines, "screens/controls", name, regenerate_golden, *EXACT)
 
 
 def entries_of(item, operated, built, state):
-    """Return the entries of a list, each by itself, and nothing for other controls."""
+    """Return the entries of a list, and whether each is chosen, in words; "" for other controls."""
     if item.kind != "begin_combo":
-        return [()]
+        return {"": ""}
     closed = set(built.names("selectable", window=item.window))
     operated(state, **{item.name: True})
-    return [(name,) for name in built.names("selectable", window=item.window) if name not in closed]
+    entries = [one for one in built if (one.kind, one.window) == ("selectable", item.window) and one.name not in closed]
+    return {entry.name: " (chosen)" if entry.value else "" for entry in entries}
 
 
 def shown_by(item, operated, built, after):
-    """Return what a slider shows afterwards, and nothing for other controls."""
+    """Return what a slider shows afterwards, "" for other controls."""
     if item.kind not in SLIDERS:
-        return []
+        return ""
     operated(after)
-    return [f"shows {now.words}" for now in built if (now.window, now.name) == (item.window, item.name)]
+    return f"shows {', '.join(now.words for now in built if (now.window, now.name) == (item.window, item.name))}"
+
+
+def test_pads_follow_a_drag(gl, built):
+    """The pad of the viewpoint has room for each view of an even grid; the light comes from where its ball is held."""
+    state = state_of(replace(SCENE, grid=GridShape(4, 9)), *IN_PIXELS[:1], do(lens.set_gloss, FIRST_GLOSS))
+    assert dragged(built, state, "pad", (0.5, 0.5)).optics.eye == pytest.approx(ViewOffset(-0.5, 0.0), abs=0.02)
+    eye = dragged(built, state, "pad", (0.9, 0.4)).optics.eye
+    assert 3.2 < eye.s < 4, "four views to the right lie a little inside the border"
+    assert eye.t == pytest.approx(-0.5 - eye.s / 4, abs=0.06)
+    for share, light in (((0.5, 0.5), (0, 0, -1)), ((0.8, 0.4), (0.6, -0.2, -math.sqrt(0.6)))):
+        assert dragged(built, state, "light ball", share).optics.gloss.light.direction == pytest.approx(light, abs=0.02)
+
+
+def dragged(built, state, name, share):
+    """Return the state while a control is held at a place, as shares of its size."""
+    ui, layout = UiHost(Look()), layout_for(state, TALL, 1.0, 1.0)
+    try:
+        for step in range(4):
+            if step:
+                (item,) = [item for item in built if item.name == name]
+                across, down = item.right - item.left, item.bottom - item.top
+                imgui.get_io().add_mouse_pos_event(item.left + share[0] * across, item.top + share[1] * down)
+            if step == 2:
+                imgui.get_io().add_mouse_button_event(0, True)
+            ui.begin(layout, Look())
+            actions = build_screen(state, layout, None)
+            ui.end()
+    finally:
+        ui.release()
+    for action in actions:
+        state = reduce(state, action)
+    return state
 
 
 def test_the_distance_of_the_focus_is_relative_to_what_stays_still(operated):

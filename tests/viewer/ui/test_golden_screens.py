@@ -118,7 +118,7 @@ SCREENS = {
     "free camera": (
         PROMPT,
         (do(viewpoint.move_camera, right=0.1), do(depth.set_brush, Brush("nearer", is_on=True)), HOVER),
-        {},
+        {"folder": FOLDER},
     ),
     "offer": (WIDE, (), {"hides_panel": False, "origin": GUESSED, "models": replace(MODELS, downloading=None)}),
     "welcome": (WIDE, (), {"scene": None, "source": None, "progress": Progress(), "existing_recent": ("/a/b.png",)}),
@@ -138,6 +138,9 @@ SCREENS = {
     "export of a page": export("web", budget=2_000_000),
 }  # fmt: skip
 
+ENLARGED = "free camera", "models", "path"
+"""Screens with larger text."""
+
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory):
@@ -155,7 +158,8 @@ def test_screens_are_the_golden_ones(viewer, name, tmp_path, regenerate_golden):
         pytest.skip(f"golden images belong to llvmpipe, this is {viewer.gl.renderer}")
     size, actions, changes = SCREENS[name]
     changes = dict(changes)
-    viewer.do(*actions, *[do(preferences.set_font_scale, 0.8)] * (size == TALL))
+    font_scale = 0.8 if size == TALL else 1.25 if name in ENLARGED else 1.0
+    viewer.do(*actions, do(preferences.set_font_scale, font_scale))
     origin, plan = changes.pop("origin", viewer.scene.depth_origin), replace(viewer.scene.plan, reasons=("A reason.",))
     scene = replace(viewer.scene, source=SOURCE, depth_origin=origin, plan=plan)
     usual = {"source": SOURCE, "scene": scene, "progress": replace(viewer.state.progress, seconds=1.0)}
