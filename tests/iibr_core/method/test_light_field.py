@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 
 from iibr_core.inpainting.registry import INPAINTERS
+from iibr_core.method.light_field import ViewMaker
 from iibr_core.types import ViewOffset
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import by_index, generate, literal_plan, square_before_wall
@@ -59,3 +60,5 @@ def test_wanted_views_alone_are_made():
     assert set(some) == {(2, 2), (3, 1), (4, 4)}
     assert all((view.colors == every[index].colors).all() for index, view in some.items())
     assert set(views_of(photo, disparity, 5, wanted=lambda: [])) == {(2, 2)}
+    maker = ViewMaker(photo.pixels, disparity.values, at)
+    assert maker.rays is maker.rays, "they are made once"

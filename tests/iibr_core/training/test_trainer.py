@@ -68,6 +68,9 @@ def test_weights_checkpoint_and_log_are_written(out):
     tensors, metadata = read_weights(out)
     assert is_close(tensors, model.state_dict())
     assert metadata["commit"] == "abc"
+    kept = TrainingRun(Scorer(9), CONFIG)
+    kept.restore(checkpoint_path(out))
+    assert kept.step == 12, "it can go on from its end"
     assert json.loads(metadata["training"])["learning_rate"] == CONFIG.learning_rate
     rows = log_rows(out)
     assert [int(row["step"]) for row in rows] == list(range(1, 13))
