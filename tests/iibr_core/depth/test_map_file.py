@@ -141,6 +141,9 @@ ROWS = {
         "map.png", lambda p, n: save(p, cv2.resize(spread(n), (112, 112))), {"stretches": True}, atol=0.06
     ),
     "8 bits that begin above 0": Row("map.png", lambda p, n: save(p, low_and_zero(n)), atol=np.inf),
+    "16 bits, holes of 0 just below the rest": Row(
+        "map.png", lambda p, n: save(p, np.where(HOLES, 0, 701 + 64000 * unit(n)).astype(np.uint16))
+    ),
     "a photo in Display P3": Row("map.png", integers(), saved={"icc_profile": profile_bytes()}),
     "jpeg": Row("map.jpg", in_mode("RGB"), atol=0.1),
     "webp": Row("map.webp", in_mode("RGB"), atol=0.06),

@@ -6,10 +6,10 @@ import pytest
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options
-from iibr_core.evaluation.scenes import find_scenes, read_scene, trial_input, trials_of
+from iibr_core.evaluation.scenes import find_scenes, in_front, read_scene, trial_input, trials_of
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.types import InputError, ViewOffset
+from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.iibr_core.known_scenes import FOREGROUND, HEIGHT, WALL, WIDTH, disparity_of_square, write_grid
 
 UNREFINED = DepthChoice(refine=False)
@@ -68,6 +68,13 @@ def turned_cameras(folder: Path) -> tuple[MultiView, Options]:
     assert offset_by_file(scene) == {"IMG_00": (0, 0), "IMG_01": (0, 1), "IMG_02": (0, -1)}
     np.save(folder / "wall.npy", np.full((HEIGHT, WIDTH), focal / 10.0, np.float32))
     return scene, Options(folder / "wall.npy")
+
+
+def test_free_cameras_see_nothing_behind_them_or_far_beyond_their_range(tmp_path) -> None:
+    camera = turned_cameras(tmp_path)[0].views[0].camera.resized(ImageSize(HEIGHT, WIDTH))
+    least = 0.1 * 60 / camera.depth_range[1]
+    found = in_front(camera, np.float32([[-1.0, 0.0, 6.0]]))
+    np.testing.assert_allclose(found, [[least, least, 6.0]], rtol=1e-5)
 
 
 def test_few_views_are_spread_and_hold_the_farthest(tmp_path) -> None:
