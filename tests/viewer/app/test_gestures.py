@@ -13,8 +13,9 @@ from viewer.app.pointer import Pointer, actions_from_hover, actions_from_pointer
 from viewer.model import depth, inspection, lens, messages, selection, stereo, viewpoint, window
 from viewer.model.action import do
 from viewer.model.commands import PalettePrompt
+from viewer.model.focal_plane import handle_points
 from viewer.model.layout import Beside, Zoom, layout_of
-from viewer.model.lens import FIRST_GLOSS, GlossBrush
+from viewer.model.lens import FIRST_GLOSS, GlossBrush, TiltHandles
 
 LAYOUTS = {
     "fits": layout_of((1100, 700), (60, 40), own_width=240),
@@ -85,8 +86,11 @@ def test_the_mouse_asks_for_what_the_mode_says(mode, regenerate_golden):
     state, lines = state_in(mode), []
     for shape, layout in LAYOUTS.items():
         frame = layout.frame
-        for place, (across, down) in PLACES.items():
-            at = frame.x + across * frame.width, frame.y + down * frame.height
+        places = {name: (frame.x + x * frame.width, frame.y + y * frame.height) for name, (x, y) in PLACES.items()}
+        x, y = handle_points(TiltHandles(), layout.picture)[0]
+
+        places |= {"beside a handle": (x + 15.5, y), "beside the divider": (frame.x + 0.3 * frame.width + 9.0, y)}
+        for place, at in places.items():
             for name, pointer in pointers(*at):
                 asked = [*actions_from_pointer(pointer, layout, state, pick)]
                 asked += actions_from_hover(pointer, layout, state, pick)
