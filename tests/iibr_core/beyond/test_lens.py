@@ -14,7 +14,6 @@ from tests.iibr_core.scenes import smooth_texture
 SIZE = ImageSize(40, 56)
 EYE = ViewOffset(0.4, -0.7)
 CAMERA = ViewOffset(1.1, 0.5)
-INSIDE = np.s_[10:-10, 10:-10]
 
 
 def light_of(optics: Optics, *views: tuple[ViewOffset, FloatImage], disparity: FloatImage | None = None) -> FloatImage:
@@ -29,7 +28,7 @@ def sheared(view: FloatImage, by: FloatImage, camera: tuple[float, float]) -> Fl
     y, x = np.indices(SIZE)
     places = [y - by * camera[0], x - by * camera[1]]
     light = linear_from_srgb(view)
-    return np.stack([map_coordinates(light[..., c], places, order=3, mode="mirror") for c in range(3)], axis=-1)
+    return np.stack([map_coordinates(light[..., c], places, order=3, mode="reflect") for c in range(3)], axis=-1)
 
 
 def focus_of(optics: Optics) -> FloatImage:
@@ -44,7 +43,7 @@ def focus_of(optics: Optics) -> FloatImage:
 def test_a_camera_is_sheared_to_the_focus(tilt) -> None:
     optics, view = Optics(EYE, focus_disparity=1.3, focus_tilt=tilt), smooth_texture(*SIZE)
     expected = sheared(view, focus_of(optics), (CAMERA.t - EYE.t, CAMERA.s - EYE.s))
-    np.testing.assert_allclose(light_of(optics, (CAMERA, view))[INSIDE], expected[INSIDE], atol=0.01)
+    np.testing.assert_allclose(light_of(optics, (CAMERA, view)), expected, atol=0.01)
 
 
 def test_light_above_white_counts_as_it_is_and_recovery_adds_none():
