@@ -39,9 +39,10 @@ def focus_of(optics: Optics) -> FloatImage:
     return np.asarray(optics.focus_disparity + right * across + lower * down, np.float32)
 
 
+@pytest.mark.parametrize("focus", [1.3, 6.3, -6.3])
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (1.5, 0.0), (0.0, -1.0), (0.5, 1.0)])
-def test_a_camera_is_sheared_to_the_focus(tilt) -> None:
-    optics, view = Optics(EYE, focus_disparity=1.3, focus_tilt=tilt), smooth_texture(*SIZE)
+def test_a_camera_is_sheared_to_the_focus_and_mirrored_at_its_borders(tilt, focus) -> None:
+    optics, view = Optics(EYE, focus_disparity=focus, focus_tilt=tilt), smooth_texture(*SIZE)
     expected = sheared(view, focus_of(optics), (CAMERA.t - EYE.t, CAMERA.s - EYE.s))
     np.testing.assert_allclose(light_of(optics, (CAMERA, view)), expected, atol=0.01)
 
