@@ -55,7 +55,7 @@ def test_rows_nearer_together_than_columns_are_drawn_as_on_the_desktop(tab, tmp_
     wait_until_still(tab)
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(folder)))
-        for t, focus, aperture in ((-1.5, 0.0, 0.0), (0.0, SQUARE_PX, 3.0)):
+        for t, focus, aperture in ((-1.5, 0.0, 0.0), (1.5, SQUARE_PX, 3.0)):
             set_desktop_lens(viewer, 0.5, t, focus, aperture)
             set_lens(tab, 0.5, t, focus, aperture)
             wait_until_still(tab)
