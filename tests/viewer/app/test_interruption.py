@@ -24,7 +24,7 @@ def interrupt_when_resized(state):
     return state
 
 
-def test_a_signal_during_a_callback_is_not_lost(display, tmp_path, monkeypatch):
+def test_a_signal_during_a_callback_is_not_lost(display, no_egl_context, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(KeyboardInterrupt):
         run(AppState(), None, do(interrupt_when_resized))
