@@ -5,13 +5,13 @@ Colours are means of blocks, each row a text such as "#ff8000 000000"; they are 
 
 import json
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+from tests.golden_rows import keep_row, read_rows
+
 MAX_BLOCKS = 16
 
 
@@ -33,17 +33,15 @@ def spread(values: NDArray[Any]) -> list[float]:
     return [float(f"{part:.6g}") for part in parts]
 
 
-def require_golden(facts: dict[str, Any], name: str, levels: float, is_regenerated: bool) -> None:
-    """Fail where facts differ from `tests/golden/<name>.json`, or write them there.
+def require_golden(facts: dict[str, Any], name: str, row: str, levels: float, is_regenerated: bool) -> None:
+    """Fail where facts differ from the row of a golden table, or write them there.
 
     levels: largest difference of colours, of 0..255; numbers agree to 0.2 %.
     """
-    facts, path = json.loads(json.dumps(facts, default=_plain)), GOLDEN / f"{name}.json"
+    facts = json.loads(json.dumps(facts, default=_plain))
     if is_regenerated:
-        lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(fact)}" for name, fact in facts.items())
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"{{\n{lines}\n}}\n", "utf-8")
-    problems = list(differences(facts, json.loads(path.read_text("utf-8")), levels))
+        keep_row(name, row, facts)
+    problems = list(differences(facts, read_rows(name)[row], levels))
     assert not problems, "\n".join(problems)
 
 

@@ -13,7 +13,7 @@ from iibr_core.depth.guess import guess_depth
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.stages import ALL_STAGES
 from iibr_core.types import FloatImage, image_size
-from tests.golden_text import FOLDER
+from tests.golden_rows import FOLDER
 from tests.iibr_core.depth.drawn_photo import drawn
 from tests.iibr_core.scenes import photo_of, smooth_texture
 from tests.image_compare import DECISIONS, assert_close, read_png, write_png

@@ -18,7 +18,7 @@ from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.types import ViewOffset
-from tests.golden_text import FOLDER as GOLDEN
+from tests.golden_rows import FOLDER as GOLDEN
 from tests.golden_text import assert_same_text
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
 from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of, turned_cameras

@@ -119,7 +119,7 @@ def test_other_programs_find_what_they_found_before(hard, tmp_path, row, regener
     path, message = export(hard, row, tmp_path)
     message = message and re.sub(r"[\d.]+ MB", "some MB", message)
     facts = facts_of(path) | {"message": message}
-    require_golden(facts, f"exports/{row.kind}-{row.name}", row.levels, regenerate_golden)
+    require_golden(facts, "exports", f"{row.kind}-{row.name}", row.levels, regenerate_golden)
 
 
 def seen(row: int, column: int) -> np.ndarray:

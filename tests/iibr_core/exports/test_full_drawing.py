@@ -36,7 +36,7 @@ def test_pictures_are_drawn_as_before_however_they_are_cut_into_tiles(hard, monk
     picture = FullPicture(source.scene, source.plan(), source.loaded, optics, size, part)
     light = draw_full(picture, source.draw)
     shown = np.rint(255 * np.clip(srgb_from_linear(light), 0, 1))
-    require_golden({"light": spread(light), "colors": colors(shown)}, f"full/{name}", 3, regenerate_golden)
+    require_golden({"light": spread(light), "colors": colors(shown)}, "full", name, 3, regenerate_golden)
     monkeypatch.setattr(full_drawing, "TILE_PX", 40)
     in_tiles = np.rint(255 * np.clip(srgb_from_linear(draw_full(picture, source.draw)), 0, 1))
     assert np.abs(in_tiles - shown).mean() < 0.3

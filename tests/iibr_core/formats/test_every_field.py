@@ -283,7 +283,7 @@ def test_light_fields_are_opened_as_before(tmp_path, name, regenerate_golden) ->
     inside = list(folder.iterdir())
     path = inside[0] if name.startswith(("quilt", "le", "ly", "nerf")) else folder
     path = folder / "field" if name == "nerfstudio" else path
-    require_golden(field_facts(path), f"fields/{name.replace('/', ', ')}", 2, regenerate_golden)
+    require_golden(field_facts(path), "fields", name, 2, regenerate_golden)
 
 
 POSES: dict[str, Write] = {
@@ -298,4 +298,4 @@ POSES: dict[str, Write] = {
 def test_cameras_are_read_as_before(tmp_path, name, regenerate_golden) -> None:
     (tmp_path / "scene").mkdir()
     POSES[name](tmp_path / "scene")
-    require_golden(camera_poses(tmp_path / "scene"), f"cameras/{name}", 2, regenerate_golden)
+    require_golden(camera_poses(tmp_path / "scene"), "cameras", name, 2, regenerate_golden)

@@ -117,4 +117,4 @@ MAPS: dict[str, tuple[Write, int]] = {
 def test_maps_are_read_as_before(tmp_path, name, regenerate_golden) -> None:
     write, levels = MAPS[name]
     write(tmp_path / name)
-    require_golden(map_facts(tmp_path / name), f"maps/{name}", levels, regenerate_golden)
+    require_golden(map_facts(tmp_path / name), "maps", name, levels, regenerate_golden)

@@ -242,4 +242,4 @@ FILES: dict[str, tuple[Callable[[Path], object], int]] = {
 def test_photos_are_read_as_before(tmp_path, name, regenerate_golden) -> None:
     write, levels = FILES[name]
     write(tmp_path / name)
-    require_golden(photo_facts(tmp_path / name), f"photos/{name}", levels, regenerate_golden)
+    require_golden(photo_facts(tmp_path / name), "photos", name, levels, regenerate_golden)

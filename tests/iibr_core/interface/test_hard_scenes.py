@@ -79,7 +79,7 @@ def test_a_photo_is_seen_from_anywhere_through_every_lens(folder, regenerate_gol
         "plan": [plan.grid, plan.disparity_scale, plan.disparity_zero, plan.disparity_range_px, plan.reasons[:3]],
         **facts_of(field), "between": shown(field.view(-1.5, -0.25)), **through(field, LENSES),
     }  # fmt: skip
-    require_golden(facts, "interface/photo", 2, regenerate_golden)
+    require_golden(facts, "interface", "photo", 2, regenerate_golden)
 
 
 def test_a_bright_photo_keeps_its_light(folder, regenerate_golden) -> None:
@@ -88,7 +88,7 @@ def test_a_bright_photo_keeps_its_light(folder, regenerate_golden) -> None:
     field = iibr.from_arrays(pixels, disparity, 60.0, "bright").light_field((3, 4), parallax="literal")
     np.testing.assert_allclose(field.views[1, 2], pixels, atol=1e-3)
     lenses = {"near": FIELD_LENSES["near"], "lost": {"focus": 0.0, "aperture": 2.0, "highlights": 1.0}}
-    require_golden({**facts_of(field), **through(field, lenses)}, "interface/bright", 2, regenerate_golden)
+    require_golden({**facts_of(field), **through(field, lenses)}, "interface", "bright", 2, regenerate_golden)
     field.save("bright_eslf.png", "eslf")
     read = iibr.open("bright_eslf.png").light_field()
     assert np.abs(read.views[0, 3] / 255.0 - np.clip(field.views[0, 3], 0, 1)).max() < 1 / 255
@@ -102,7 +102,7 @@ def test_a_field_of_uneven_rows_is_refocused_saved_and_opened_again(folder, rege
         np.testing.assert_allclose(field.views[v, u], hard.field_view(v, u), atol=2e-3)
     np.testing.assert_allclose(field.view(-2, 1), hard.field_view(2, 0), atol=2e-3)
     facts = {"scene": [scene.name, scene.depth_source, *scene.notes], **facts_of(field)}
-    require_golden({**facts, **through(field, FIELD_LENSES)}, "interface/field", 2, regenerate_golden)
+    require_golden({**facts, **through(field, FIELD_LENSES)}, "interface", "field", 2, regenerate_golden)
     square = np.s_[11:17, 31:37]
     assert np.abs(field.refocus(hard.NEAR_PX, 3.0)[square] - field.view(0, 0)[square]).max() < 0.02, "stays sharp"
     field.save("saved")

@@ -106,7 +106,7 @@ def test_photos_are_opened_as_before(tmp_path, name, regenerate_golden) -> None:
         "through the lens": [spread(seen.disparity), *shown(seen.colors)],
         "inputs": [path.name for path in inputs_of(source)],
     }  # fmt: skip
-    require_golden(facts, f"scenes/{name}", 2, regenerate_golden)
+    require_golden(facts, "scenes", name, 2, regenerate_golden)
 
 
 def test_a_field_is_opened_as_before_with_gloss_and_without(tmp_path, regenerate_golden) -> None:
@@ -120,7 +120,7 @@ def test_a_field_is_opened_as_before_with_gloss_and_without(tmp_path, regenerate
         "glossy": {str(at): shown(places[at].colors) for at in ((1, 2), (0, 0), (2, 3))},
         "inputs": [path.name for path in inputs_of(source)],
     }  # fmt: skip
-    require_golden(facts, "scenes/field", 2, regenerate_golden)
+    require_golden(facts, "scenes", "field", 2, regenerate_golden)
     bare = replace(source, depth=DepthChoice())
     drafts = [each.scene for each in results_of(SceneRequest(1, bare), lambda: CENTRE) if isinstance(each, SceneReady)]
     assert not drafts[0].has_view_disparity
