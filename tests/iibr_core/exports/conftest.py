@@ -1,14 +1,16 @@
 """Open scenes, a plain one and two that are hard in every way, and a function that exports them."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from numpy.typing import NDArray
 
 from iibr_core.exports.kinds import ExportOptions, export_kind, export_path
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource, write_export
 from iibr_core.scenes.lens_choice import LensChoice
 from iibr_core.scenes.scene import Source
@@ -21,9 +23,21 @@ from viewer.display.offscreen import OffscreenScene
 @pytest.fixture(scope="package")
 def opened(tmp_path_factory) -> Iterator[ExportSource]:
     source = Source(str(write_scene(tmp_path_factory.mktemp("exports"))), grid=GridShape(3, 3))
-    with OffscreenScene() as drawer:
-        opened = drawer.open_for_export(source, 1.0, LensChoice(), lambda scene: None)
+    with drawn(source) as opened:
         yield opened
+
+
+@contextmanager
+def drawn(given: Source, depth_strength: float = 1.0) -> Iterator[ExportSource]:
+    """Open a scene that draws in its own GL context, whichever was made last: several scenes are open at a time."""
+    with OffscreenScene() as drawer:
+        source = drawer.open_for_export(given, depth_strength, LensChoice(), lambda scene: None)
+
+        def draw(settings: RenderSettings) -> NDArray[Any]:
+            with drawer.gl.ctx:
+                return source.draw(settings)
+
+        yield replace(source, draw=draw)
 
 
 @pytest.fixture
@@ -38,11 +52,7 @@ def hard(tmp_path_factory) -> Iterator[dict[str, ExportSource]]:
     folder = tmp_path_factory.mktemp("hard")
     given = write_hard_field(folder / "field"), replace(write_hard_photo(folder), focus_disparity=0.24)
     with ExitStack() as stack:
-        drawers = [stack.enter_context(OffscreenScene()) for _ in given]
-        scenes = [
-            drawer.open_for_export(source, strength, LensChoice(), lambda scene: None)
-            for drawer, source, strength in zip(drawers, given, (1.0, 3.0))
-        ]
+        scenes = [stack.enter_context(drawn(source, strength)) for source, strength in zip(given, (1.0, 3.0))]
         yield dict(zip(("field", "photo"), scenes))
 
 
