@@ -17,7 +17,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.browsers.chromium import Tab
-from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
+from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
 from tests.web.conftest import STILL, canvas, export, slide, wait_until_still
 from viewer.display.offscreen import OffscreenScene
 
@@ -68,7 +68,12 @@ POSES = [Pose(np.zeros(3), Rotation.identity()), *(Pose(at, Rotation.from_rotvec
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory) -> Path:
-    return write_scene(tmp_path_factory.mktemp("scene"))
+    """The wall's lower left part comes nearer downwards."""
+    path = write_scene(tmp_path_factory.mktemp("scene"))
+    disparity = np.load(path.with_name("scene_disparity.npy"))
+    disparity[HEIGHT // 2 :, : WIDTH // 4] += np.linspace(0, (NEAR - FAR) / 4, HEIGHT // 2, dtype=np.float32)[:, None]
+    np.save(path.with_name("scene_disparity.npy"), disparity)
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -195,12 +200,12 @@ def move_hand(tab: Tab, x: float, y: float, trigger: int, hand: str = "right") -
 def test_a_hand_focuses_where_it_points_and_opens_the_aperture(worn) -> None:
     """A surface in focus lies in the window's plane: both eyes see it at the same place of the window."""
     found = []
-    for place in ((-0.5, 0.3), (0.0, 0.0), (2.0, 0.0)):
+    for place in ((-0.5, 0.3), (-0.5, -0.3), (0.0, 0.0), (2.0, 0.0)):
         move_hand(worn, *place, trigger=1)
         move_hand(worn, *place, trigger=0)
         found.append(lens(worn))
-    (far, _), (near, aperture), beside = found
-    assert near > far, "the square lies before the wall"
+    (far, _), (below, _), (near, aperture), beside = found
+    assert near > below > far, "the square lies before the wall, which comes nearer downwards"
     assert beside == [near, aperture], "the hand points beside the window"
     wait_for_frames(worn, 24)
     left, right = eyes_at(worn, POSES[0])

@@ -194,21 +194,27 @@ def test_heads_anywhere_see_what_the_grid_has_with_an_eye_each(limits, focus) ->
 
 
 @pytest.mark.parametrize(
-    ("held", "screen", "turned"),
+    ("held", "screen", "turned", "axis"),
     [
-        ({"alpha": 0, "beta": 40, "gamma": 0}, 0, {"beta": 50}),
-        ({"alpha": 0, "beta": 0, "gamma": -40}, 90, {"gamma": -50}),
-        ({"alpha": 0, "beta": 0, "gamma": 40}, 270, {"gamma": 50}),
-        ({"alpha": 0, "beta": 0, "gamma": -85}, 90, {"alpha": 180, "beta": 180, "gamma": 85}),
+        ({"alpha": 0, "beta": 40, "gamma": 0}, 0, {"beta": 50}, "t"),
+        ({"alpha": 0, "beta": 0, "gamma": -40}, 90, {"gamma": -50}, "t"),
+        ({"alpha": 0, "beta": 0, "gamma": 40}, 270, {"gamma": 50}, "t"),
+        ({"alpha": 0, "beta": 0, "gamma": -85}, 90, {"alpha": 180, "beta": 180, "gamma": 85}, "t"),
+        ({"alpha": 0, "beta": 0, "gamma": 0}, 0, {"gamma": 10}, "s"),
+        ({"alpha": 0, "beta": 0, "gamma": 0}, 90, {"beta": 10}, "s"),
+        ({"alpha": 0, "beta": 0, "gamma": 0}, 270, {"beta": -10}, "s"),
     ],
 )
-def test_a_screen_whose_upper_border_is_raised_turns_down_however_it_is_held(held, screen, turned) -> None:
-    """A screen upright in landscape lies where angles jump."""
+def test_a_screen_turns_to_where_its_border_goes_down_however_it_is_held(held, screen, turned, axis) -> None:
+    """Where the upper border is raised, it turns down; where the right one goes down, right. A screen upright in
+    landscape lies where angles jump.
+    """
     code = (
         f"import {{ Tilt }} from {json.dumps((WEB / 'tilt.js').as_uri())};\n"
         f"const tilt = new Tilt(), held = {json.dumps(held)}, turned = {{ ...held, ...{json.dumps(turned)} }};\n"
         f"console.log(JSON.stringify([held, turned, held, held].map(one => tilt.turn(one, {screen}))));"
     )
     done = subprocess.run(["node", "--input-type=module", "-e", code], capture_output=True, text=True, check=True)
-    found = [one[axis] for one in json.loads(done.stdout) for axis in ("t", "s")]
-    assert found == pytest.approx([0, 0, 9.6, 0, -9.2, 0, 0, 0], abs=1e-6), "noise of 0.4 degrees turns nothing"
+    expected = [{"t": 0, "s": 0} | {axis: turn} for turn in (0, 9.6, -9.2, 0)]
+    for found, turn in zip(json.loads(done.stdout), expected, strict=True):
+        assert found == pytest.approx(turn, abs=1e-6), "noise of 0.4 degrees turns nothing"

@@ -164,6 +164,7 @@ STORIES = {
         do(lens.set_gloss, GLOSS), tone(gamma=1.5), do(depth.set_brush, BRUSH), do(depth.paint, (0.5, 0.5)), END,
         do(lens.set_depth_strength, 2.0, True), END, do(look.copy_look), UNDO, UNDO, UNDO, UNDO,
         do(lens.set_aperture, 0.5), END, do(lens.show_before, True), do(look.paste_look), END, UNDO,
+        do(depth.set_brush, BRUSH), do(depth.paint, (0.2, 0.5)), END, do(look.paste_look), END, UNDO,
         do(look.paste_look_to, 0), do(look.paste_look_to, 1),
     )),
     "stereo": (OPEN, (

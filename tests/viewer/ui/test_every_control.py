@@ -8,18 +8,22 @@ from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import ApertureShape
 from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.golden_text import assert_same_text
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from tests.viewer.model.told import EXACT, changes
 from tests.viewer.ui.conftest import CONTROLS, SLIDERS
-from tests.viewer.ui.test_golden_screens import SCREENS, SOURCE, TALL
+from tests.viewer.ui.test_golden_screens import MODELS, SCREENS, SOURCE, TALL, prompt
 from viewer.model import depth, inspection, lens, preferences, viewpoint
 from viewer.model.action import do
 from viewer.model.depth import Brush, DepthSample
+from viewer.model.depth_models import ModelsPrompt
 from viewer.model.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.preferences import SECTIONS, Preferences, with_sections
+from viewer.model.saving import SavePrompt
 from viewer.model.window import layout_for
 from viewer.ui.host import UiHost
 from viewer.ui.screen import build_screen
@@ -38,7 +42,12 @@ IN_PIXELS = (
     do(lens.paint_gloss, (0.5, 0.5), GlossBrush(), True), do(lens.set_focus, 1.5), do(viewpoint.set_loop, "circle"),
     do(depth.set_tone, DepthEdits(gamma=2.0), True), do(inspection.set_overlay, "disparity"),
 )  # fmt: skip
-STATES = SCREENS | {"panel in pixels": (TALL, IN_PIXELS, {})}
+JPEG_AFTER_PNG = SavePrompt("/photos/a.jpg", ScreenSize(96, 64), form=PictureFormat(16))
+STATES = SCREENS | {
+    "panel in pixels": (TALL, IN_PIXELS, {}),
+    "save another kind": prompt(JPEG_AFTER_PNG),
+    "another model": prompt(ModelsPrompt(1), models=MODELS),
+}
 LEFT_OUT = "history.last", "history.gesture"
 """Changes that a person does not see."""
 

@@ -44,8 +44,8 @@ LIGHT, IN_PIXELS = do(preferences.set_theme, "light"), do(preferences.set_units,
 JOBS = JobProgress(1, "export", "a.mp4", "drawing frames", 0.5, 40.0), JobProgress(2, "picture", "b.png")
 MODELS = DepthModels(
     (
-        ModelOffer("a", "Model A", 50, "MIT", "a.org", "A small model of 50 MB, which is here.", True, "", True, True),
         ModelOffer("b", "Model B", 25, "MIT", "b.org", "A smaller model.", runs_as_installed=True),
+        ModelOffer("a", "Model A", 50, "MIT", "a.org", "A small model of 50 MB, which is here.", True, "", True, True),
     ),
     downloading=Downloading("Model B", 10, 25),
 )
@@ -128,7 +128,7 @@ SCREENS = {
     "save a map": prompt(SavePrompt("/photos/a.pfm", ScreenSize(96, 64), True, "map")),
     "files": prompt("files", files=(SAVED, replace(SAVED, problem="the disk is full")), jobs=JOBS),
     "quit": prompt("quit", jobs=JOBS, has_dialogs=True),
-    "models": prompt(ModelsPrompt(1), models=MODELS),
+    "models": prompt(ModelsPrompt(), models=MODELS),
     "path": prompt(PathPrompt("photo", "/p/", listing=Listing("/p/", "/p", ("holiday",), ("a.jpg",)))),
     "export of a video": export("mp4", motion="swing"),
     "export of a stack": export("focal-stack", bits=16),
