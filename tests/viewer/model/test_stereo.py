@@ -10,6 +10,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.model.scene_stories import LENTICULAR
 from viewer.model import stereo
 from viewer.model.app_state import AppState
 from viewer.model.stereo import STEREO_MODES, Monitor, Stereo
@@ -71,3 +72,12 @@ def test_pictures_fit_their_rooms_and_places_lead_back(mode, size):
     middle = stereo.place_in_photo(weave, weave.frame_px.width / 2, weave.frame_px.height / 2)
     assert middle == pytest.approx((0.5, 0.5), abs=0.51 / min(weave.eyes[0].size_px))
     assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["sbs", "cross-eyed"])
+def test_a_lenticular_display_shows_its_views_from_left_to_right_whatever_the_eyes(mode):
+    shown = replace(stereo.set_mode(STATE, mode), stereo=Stereo(display=LENTICULAR))
+    for state in (shown, stereo.swap_eyes(shown)):
+        places = [eye.optics.eye.s for eye in stereo.weave_of(state, SCENE, ScreenSize(3840, 2160)).eyes]
+        assert len(places) == LENTICULAR.quilt.views
+        assert places == sorted(places)
