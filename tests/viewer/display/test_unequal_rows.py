@@ -50,8 +50,8 @@ def test_dolly_magnifies_alike_across_and_down(viewer):
 
 
 def test_the_surface_under_the_pointer_is_picked(viewer):
-    viewer.do(do(lens.move_eye, ViewOffset(1.0, 0.0)))
-    upper_edge = 28 - SQUARE_PX * ROW_STEP
+    viewer.do(do(lens.move_eye, ViewOffset(2.0, 0.0)))
+    upper_edge = 28 - 2 * SQUARE_PX * ROW_STEP
     assert viewer.pick(48, upper_edge - 1.2) == pytest.approx(WALL_PX, abs=0.2)
     assert viewer.pick(48, upper_edge + 1.2) == pytest.approx(SQUARE_PX, abs=0.2)
 
