@@ -115,19 +115,25 @@ def operated(gl, built):
 
     def operate(state, **answers):
         built.answers = answers
-        ui = UiHost(Look())
-        try:
-            layout = layout_for(state, WINDOW, 1.0, 1.0)
+        return after_frames(state, WINDOW)
+
+    return operate
+
+
+def after_frames(state, size, frames=1, before_frame=lambda frame: None):
+    """Return the state after what a screen of it asks for in the last frame. before_frame: called with its number."""
+    ui, layout = UiHost(Look()), layout_for(state, size, 1.0, 1.0)
+    try:
+        for frame in range(frames):
+            before_frame(frame)
             ui.begin(layout, Look())
             actions = build_screen(state, layout, None)
             ui.end()
-        finally:
-            ui.release()
-        for action in actions:
-            state = reduce(state, action)
-        return state
-
-    return operate
+    finally:
+        ui.release()
+    for action in actions:
+        state = reduce(state, action)
+    return state
 
 
 @pytest.fixture(scope="module")

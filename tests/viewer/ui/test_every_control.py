@@ -15,7 +15,7 @@ from tests.golden_text import assert_same_text
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from tests.viewer.model.told import EXACT, changes
-from tests.viewer.ui.conftest import CONTROLS, SLIDERS
+from tests.viewer.ui.conftest import CONTROLS, SLIDERS, after_frames
 from tests.viewer.ui.test_golden_screens import MODELS, SCREENS, SOURCE, TALL, prompt
 from viewer.model import depth, inspection, lens, preferences, viewpoint
 from viewer.model.action import do
@@ -24,10 +24,6 @@ from viewer.model.depth_models import ModelsPrompt
 from viewer.model.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.preferences import SECTIONS, Preferences, with_sections
 from viewer.model.saving import SavePrompt
-from viewer.model.window import layout_for
-from viewer.ui.host import UiHost
-from viewer.ui.screen import build_screen
-from viewer.ui.style import Look
 
 NINE = GridShape(9, 9)
 PLAN = replace(plan_of(NINE), reasons=("A reason.",))
@@ -122,23 +118,16 @@ def test_pads_follow_a_drag(gl, built):
 
 def dragged(built, state, name, share):
     """Return the state while a control is held at a place, as shares of its size."""
-    ui, layout = UiHost(Look()), layout_for(state, TALL, 1.0, 1.0)
-    try:
-        for step in range(4):
-            if step:
-                (item,) = [item for item in built if item.name == name]
-                across, down = item.right - item.left, item.bottom - item.top
-                imgui.get_io().add_mouse_pos_event(item.left + share[0] * across, item.top + share[1] * down)
-            if step == 2:
-                imgui.get_io().add_mouse_button_event(0, True)
-            ui.begin(layout, Look())
-            actions = build_screen(state, layout, None)
-            ui.end()
-    finally:
-        ui.release()
-    for action in actions:
-        state = reduce(state, action)
-    return state
+
+    def hold(frame):
+        if frame:
+            (item,) = [item for item in built if item.name == name]
+            across, down = item.right - item.left, item.bottom - item.top
+            imgui.get_io().add_mouse_pos_event(item.left + share[0] * across, item.top + share[1] * down)
+        if frame == 2:
+            imgui.get_io().add_mouse_button_event(0, True)
+
+    return after_frames(state, TALL, 4, hold)
 
 
 def test_the_distance_of_the_focus_is_relative_to_what_stays_still(operated):
