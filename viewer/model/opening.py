@@ -128,8 +128,8 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
         chosen_focus=_carried_focus(state.chosen_focus, state.optics, carried),
         focus_before=_carried_focus(state.focus_before, state.optics, carried),
         inspection=replace(state.inspection, probe=None),
+        restoring=None,
     )
-    shown = replace(shown, restoring=None)
     if old is None or not is_same:
         shown = _begin_scene(shown, old, scene)
     else:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, SAVE_ELSEWHERE, read_bytes, require_file
 from iibr_core.formats.images.iso_boxes import boxes, meta_boxes, with_primary
-from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
+from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size, turned_size
 from iibr_core.formats.images.pillow_reader import damage_as_input_error, exif_of, facts_of, orientation_in
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
@@ -25,8 +25,7 @@ def read_heic(path: Path, number: int = 0) -> Picture:
     is_premultiplied = bool(getattr(picture, "premultiplied_alpha", False))
     colors = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
     # Exif states the size that the camera stored, before the picture is turned.
-    is_turned = orientation_in(exif_of(picture.info.get("exif"))) >= 5
-    stored = ImageSize(*pixels.shape[1::-1]) if is_turned else image_size(pixels)
+    stored = turned_size(image_size(pixels), orientation_in(exif_of(picture.info.get("exif"))))
     return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, stored))
 
 

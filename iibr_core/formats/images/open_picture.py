@@ -22,7 +22,7 @@ from iibr_core.formats.images.file_kinds import RAW, START_BYTES, Kind, kind_of
 from iibr_core.formats.images.heic import heic_size, read_heic
 from iibr_core.formats.images.lfp import lfp_size, read_lfp
 from iibr_core.formats.images.metadata import SETTINGS_KEY, PictureMetadata, metadata_in
-from iibr_core.formats.images.picture import Picture
+from iibr_core.formats.images.picture import Picture, turned_size
 from iibr_core.formats.images.record3d import decode_recording, recording_header
 from iibr_core.formats.images.xmp import text_in, unpack
 from iibr_core.types import ImageSize, InputError
@@ -84,7 +84,7 @@ class OpenPicture:
     @property
     def upright_size(self) -> ImageSize:
         """Height and width as shown, turned by the orientation."""
-        return ImageSize(self.size.width, self.size.height) if self.orientation >= 5 else self.size
+        return turned_size(self.size, self.orientation)
 
     def text(self, name: str) -> str:
         """Return a text of the header; "" where it is missing or damaged, and for files OpenImageIO cannot read."""

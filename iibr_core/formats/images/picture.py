@@ -68,9 +68,19 @@ class Picture:
         return bool(self.pixels.dtype.kind == "f")
 
 
+def is_quarter_turn(orientation: int) -> bool:
+    """Return whether Exif's Orientation exchanges height and width."""
+    return 5 <= orientation <= 8
+
+
+def turned_size(size: ImageSize, orientation: int) -> ImageSize:
+    """Return the size upright of a picture stored with this size, or the size as stored of an upright one."""
+    return ImageSize(size.width, size.height) if is_quarter_turn(orientation) else size
+
+
 def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     """Return stored pixels (H, W, ...) turned by Exif's Orientation; values other than 2 to 8 change nothing."""
-    if orientation >= 5 and orientation <= 8:
+    if is_quarter_turn(orientation):
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
         pixels = pixels[::-1]

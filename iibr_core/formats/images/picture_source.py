@@ -13,7 +13,7 @@ from PIL import Image
 
 from iibr_core.color import bytes_from_encoded
 from iibr_core.formats.images.open_picture import open_picture
-from iibr_core.formats.images.picture import Picture, full_scale, upright
+from iibr_core.formats.images.picture import Picture, full_scale, turned_size, upright
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.types import ImageSize, InputError, image_size
 
@@ -58,8 +58,9 @@ def source_size(source: PictureSource) -> ImageSize:
 def shown_size(source: PictureSource) -> ImageSize:
     """Return the size from the file's header, as shown: a whole picture is turned by its orientation."""
     size = source_size(source)
-    is_turned = source == source.whole and open_picture(source.path).header_of(source.number).orientation >= 5
-    return ImageSize(size.width, size.height) if is_turned else size
+    if source != source.whole:
+        return size
+    return turned_size(size, open_picture(source.path).header_of(source.number).orientation)
 
 
 def read_source(source: PictureSource) -> Picture:
@@ -112,8 +113,7 @@ def small_picture(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
         if picture.mode.startswith(DEEP_MODES):
             return None
         orientation = open_picture(path).orientation
-        box = ImageSize(within.width, within.height) if orientation >= 5 else within
-        return upright(_resized(picture.convert("RGB"), box), orientation)
+        return upright(_resized(picture.convert("RGB"), turned_size(within, orientation)), orientation)
     return None
 
 
