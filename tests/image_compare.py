@@ -11,6 +11,8 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from tests.golden_rows import FOLDER
+
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -63,6 +65,29 @@ def assert_close(image, expected, tolerance, folder, name="image"):
     else:
         write_png(place, image)
     raise AssertionError(f"{name}: {problem}; see {place}")
+
+
+def assert_golden(
+    image: NDArray[np.uint8],
+    name: str,
+    tolerance: Tolerance,
+    folder: Path,
+    regenerate: bool,
+    tile: tuple[int, int] | None = None,
+) -> None:
+    """Compare an (H, W, 3) image with `tests/golden/NAME.png`, or write it there.
+
+    tile: height and width of the parts of a sheet, each of which is compared by itself; None: the whole is.
+    """
+    path = FOLDER / f"{name}.png"
+    if regenerate:
+        write_png(path, image)
+    expected, (height, width) = read_png(path), tile or image.shape[:2]
+    assert image.shape == expected.shape, f"{name}: shape {image.shape}, expected {expected.shape}"
+    for row, column in np.ndindex(-(-image.shape[0] // height), -(-image.shape[1] // width)):
+        part = np.s_[row * height : (row + 1) * height, column * width : (column + 1) * width]
+        words = path.stem if tile is None else f"{path.stem}, row {row + 1}, column {column + 1}"
+        assert_close(image[part], expected[part], tolerance, folder, words)
 
 
 def write_png(path: Path, image: NDArray[np.uint8]) -> None:

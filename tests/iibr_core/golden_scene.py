@@ -14,7 +14,7 @@ from iibr_core.color import bytes_from_encoded, encoded_from_stored, linear_from
 from iibr_core.interface.fields import LightField
 from iibr_core.types import GridShape
 from tests.iibr_core.scenes import bilinear
-from tests.image_compare import OTHER_PROCESSOR, assert_close, read_png, write_png
+from tests.image_compare import OTHER_PROCESSOR, assert_golden
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "core"
 
@@ -83,12 +83,10 @@ def with_maps(colors: np.ndarray, disparity: np.ndarray, inpainted: np.ndarray) 
     return np.concatenate([shown / (2 if shown.max() > 1.5 else 1), maps], axis=1)
 
 
-def assert_golden(pictures: list[np.ndarray], name: str, folder: Path, regenerates: bool) -> None:
+def assert_golden_pictures(pictures: list[np.ndarray], name: str, folder: Path, regenerates: bool) -> None:
     """Compare pictures (H, W, 3), 1 = white, one above the other, with those of tests/golden/core."""
     width = max(picture.shape[1] for picture in pictures)
     padded = [np.pad(picture, ((0, 0), (0, width - picture.shape[1]), (0, 0))) for picture in pictures]
     assert np.isfinite(np.concatenate(padded)).all()
     image = bytes_from_encoded(np.concatenate(padded))
-    if regenerates:
-        write_png(GOLDEN / f"{name}.png", image)
-    assert_close(image, read_png(GOLDEN / f"{name}.png"), OTHER_PROCESSOR, folder, name)
+    assert_golden(image, f"core/{name}", OTHER_PROCESSOR, folder, regenerates)

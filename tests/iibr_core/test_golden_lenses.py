@@ -18,7 +18,16 @@ from iibr_core.gloss.geometry import SceneGeometry
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
 from iibr_core.gloss.shading import make_gloss_maps, shade_views
 from iibr_core.types import CENTRE, GridShape, ImageSize, ViewOffset, ViewUpdate
-from tests.iibr_core.golden_scene import GRID, HEIGHT, WIDTH, assert_golden, grey, hard_field, hard_scene, with_maps
+from tests.iibr_core.golden_scene import (
+    GRID,
+    HEIGHT,
+    WIDTH,
+    assert_golden_pictures,
+    grey,
+    hard_field,
+    hard_scene,
+    with_maps,
+)
 from tests.iibr_core.unequal_rows import write_unequal_rows
 
 ARROW = np.array([[0, 255, 0, 0], [255, 255, 255, 0], [0, 255, 0, 120]], np.uint8)
@@ -135,4 +144,4 @@ PICTURES = {
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures_are_the_golden_ones(name, tmp_path, regenerate_golden):
-    assert_golden(PICTURES[name](tmp_path), name, tmp_path, regenerate_golden)
+    assert_golden_pictures(PICTURES[name](tmp_path), name, tmp_path, regenerate_golden)

@@ -1,4 +1,4 @@
-"""What the stages between map and views make of a hard scene, as small pictures, each of which shows all of its stage.
+"""Results of the stages between map and views on a hard scene, as small pictures that each show a whole stage.
 
 `pytest --regenerate-golden` writes them; then look at them.
 """
@@ -22,7 +22,7 @@ from iibr_core.method.rays import RaysBehind, rays_of_photo
 from iibr_core.method.steep_surfaces import join_steep_rays
 from iibr_core.stages import ALL_STAGES
 from iibr_core.types import Margins, ViewOffset
-from tests.iibr_core.golden_scene import assert_golden, grey, hard_scene, with_maps
+from tests.iibr_core.golden_scene import assert_golden_pictures, grey, hard_scene, with_maps
 
 OFFSET = ViewOffset(1.0, -2.0)
 
@@ -123,4 +123,4 @@ PICTURES = [holes, mixed_pixels, flying_pixels, landings, filled_maps]
 
 @pytest.mark.parametrize("made", PICTURES, ids=lambda made: made.__name__)
 def test_pictures_are_the_golden_ones(made, tmp_path, regenerate_golden):
-    assert_golden(made(), made.__name__.replace("_", "-"), tmp_path, regenerate_golden)
+    assert_golden_pictures(made(), made.__name__.replace("_", "-"), tmp_path, regenerate_golden)

@@ -25,7 +25,16 @@ from iibr_core.training.degradation import degrade
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import DISPLAY_P3, SRGB, Camera, GridShape, ImageSize, ViewOffset, ViewUpdate
-from tests.iibr_core.golden_scene import GRID, HEIGHT, WIDTH, assert_golden, grey, hard_field, hard_scene, with_maps
+from tests.iibr_core.golden_scene import (
+    GRID,
+    HEIGHT,
+    WIDTH,
+    assert_golden_pictures,
+    grey,
+    hard_field,
+    hard_scene,
+    with_maps,
+)
 
 CORNERS = [ViewOffset(-2.0, -2.0), ViewOffset(1.0, 2.0)]
 
@@ -160,4 +169,4 @@ PICTURES = {
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures_are_the_golden_ones(name, tmp_path, regenerate_golden):
-    assert_golden(PICTURES[name](), name, tmp_path, regenerate_golden)
+    assert_golden_pictures(PICTURES[name](), name, tmp_path, regenerate_golden)

@@ -206,8 +206,8 @@ def test_heads_anywhere_see_what_the_grid_has_with_an_eye_each(limits, focus) ->
     ],
 )
 def test_a_screen_turns_to_where_its_border_goes_down_however_it_is_held(held, screen, turned, axis) -> None:
-    """Where the upper border is raised, it turns down; where the right one goes down, right. A screen upright in
-    landscape lies where angles jump.
+    """A raised upper border turns it down, a lowered right border turns it right. A screen upright in landscape lies
+    where angles jump.
     """
     code = (
         f"import {{ Tilt }} from {json.dumps((WEB / 'tilt.js').as_uri())};\n"

@@ -1,4 +1,4 @@
-"""What parts of photos are no maps, or damaged, or hold more than a map: see test_embedded_photos for whole ones."""
+"""Parts of photos that are no maps, are damaged, or hold more than a map; test_embedded_photos reads whole photos."""
 
 import base64
 import json

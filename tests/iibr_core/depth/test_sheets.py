@@ -13,10 +13,9 @@ from iibr_core.depth.guess import guess_depth
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.stages import ALL_STAGES
 from iibr_core.types import FloatImage, image_size
-from tests.golden_rows import FOLDER
 from tests.iibr_core.depth.drawn_photo import drawn
 from tests.iibr_core.scenes import photo_of, smooth_texture
-from tests.image_compare import DECISIONS, assert_close, read_png, write_png
+from tests.image_compare import DECISIONS, assert_golden
 
 
 def assert_sheet(
@@ -26,17 +25,9 @@ def assert_sheet(
     low, high = span
     shares = (np.clip((np.nan_to_num(values, nan=low) - low) / (high - low), 0, 1) for values in maps)
     tiles = [np.pad(part, (0, 1), constant_values=0.5) for part in shares]
-    height, width = tiles[0].shape
     rows = [np.hstack(tiles[k : k + columns]) for k in range(0, len(tiles), columns)]
     sheet = np.repeat(np.rint(255 * np.vstack(rows)).astype(np.uint8)[..., None], 3, 2)
-    path = FOLDER / "depth" / f"{name}.png"
-    if regenerate:
-        write_png(path, sheet)
-    kept = read_png(path)
-    for row, column in np.ndindex(len(rows), columns):
-        tile = np.s_[row * height :, column * width :]
-        found, expected = (image[tile][:height, :width] for image in (sheet, kept))
-        assert_close(found, expected, by, folder, f"{name}, row {row + 1}, column {column + 1}")
+    assert_golden(sheet, f"depth/{name}", by, folder, regenerate, tiles[0].shape)
 
 
 HEIGHT, WIDTH = 60, 80

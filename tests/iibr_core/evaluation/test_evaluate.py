@@ -18,13 +18,12 @@ from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.types import ViewOffset
-from tests.golden_rows import FOLDER as GOLDEN
 from tests.golden_text import assert_same_text
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
 from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of, turned_cameras
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid
 from tests.iibr_core.lens_scenes import FOLDER
-from tests.image_compare import DECISIONS, assert_close, read_png, write_png
+from tests.image_compare import DECISIONS, assert_golden
 
 WAYS = ["unchanged photo", "one plane", "plain warp, true map", "iibr, true map"]
 REPORT = ["index.html", "report.json", "report.md"]
@@ -96,10 +95,7 @@ def test_the_report_is_what_it_was_and_its_order_is_plausible(all_results, regen
     padded = [np.pad(p, ((0, sizes[0] - p.shape[0]), (0, sizes[1] - p.shape[1]), (0, 0))) for p in pictures]
     count = len(WAYS) + 1
     sheet = np.vstack([np.hstack(padded[k : k + count]) for k in range(0, len(padded), count)])
-    path = GOLDEN / "evaluation" / "pictures.png"
-    if regenerate_golden:
-        write_png(path, sheet)
-    assert_close(sheet, read_png(path), DECISIONS, tmp_path, "pictures")
+    assert_golden(sheet, "evaluation/pictures", DECISIONS, tmp_path, regenerate_golden)
     photo, *_, ours = all_results[4].rows
     assert list(ours.refocus_db) == ["near", "middle", "far"]
     assert all(ours.refocus_db[name] > photo.refocus_db[name] + 3 for name in ours.refocus_db)

@@ -1,4 +1,4 @@
-"""What other programs find in exported files: sizes, tags, colours, numbers, as values that JSON holds."""
+"""Facts that other programs find in exported files: sizes, tags, colours, numbers, as values that JSON holds."""
 
 import base64
 import configparser

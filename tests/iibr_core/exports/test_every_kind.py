@@ -169,7 +169,7 @@ def dubois(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def test_cameras_state_the_metres_and_steps_of_the_scenes(hard, tmp_path) -> None:
-    """Of the field, views are cropped so that what is infinitely far stays in place; the photo's are moved."""
+    """Views of the field are cropped so that what is infinitely far stays in place; views of the photo are moved."""
     step = (scenes.NEAR_PX - scenes.INFINITY_PX) / scenes.FIELD_FOCAL_PX
     for kind in ("nerfstudio", "colmap"):
         folder = export(hard, Row("field", kind, kind), tmp_path)[0]

@@ -1,4 +1,4 @@
-"""What the free camera sees of a hard photo, against golden pictures; `pytest --regenerate-golden` writes them."""
+"""Pictures of a hard photo by the free camera, against golden ones; `pytest --regenerate-golden` writes them."""
 
 from contextlib import closing
 from dataclasses import replace
@@ -9,9 +9,8 @@ import pytest
 from iibr_core.scenes.rect import WHOLE
 from iibr_core.types import CENTRE
 from tests.golden_text import assert_same_text
-from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
+from tests.image_compare import SAME_RASTERISER, assert_close, assert_golden
 from tests.viewer.display.hard_photo import write_hard_photo
-from tests.viewer.display.test_hard_pictures import GOLDEN
 from viewer.app.free_camera_view import FreeCameraView
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, viewpoint
@@ -59,10 +58,8 @@ def test_cameras_see_the_golden_pictures(viewer, tmp_path, monkeypatch, regenera
             is_first = name == next(iter(CAMERAS))
             assert show(viewer, view, news) == (has_draft, is_first), "the photo is prepared once"
             viewer.view.converge(viewer.state, size, WHOLE)
-            image, path = viewer.view.renderer.read_image(), GOLDEN / f"camera-{name}.png"
-            if regenerate_golden:
-                write_png(path, image)
-            assert_close(image, read_png(path), SAME_RASTERISER, tmp_path, name)
+            image = viewer.view.renderer.read_image()
+            assert_golden(image, f"viewer/camera-{name}", SAME_RASTERISER, tmp_path, regenerate_golden)
             picks = [viewer.view.pick(CENTRE, x, y) for x, y in ((35.0, 25.0), (50.0, 48.0), (80.0, 10.0))]
             seen.append(f"{name}: " + ", ".join(f"{value:.3f}" for value in picks))
         assert_same_text(seen, "viewer/values", "cameras", regenerate_golden, atol=0.02)

@@ -1,4 +1,4 @@
-"""What the mouse and Escape ask for, in every mode, over a picture that fits and over a zoomed one beside its EPIs."""
+"""Actions of the mouse and of Escape in every mode, over a picture that fits and a zoomed one beside its EPIs."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What the window asks of the outside world, without a window: files, folders and dialogs that are not there."""
+"""Requests of the window to the outside world, without a window: files, folders and dialogs that are not there."""
 
 from dataclasses import replace
 

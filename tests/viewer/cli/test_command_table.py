@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.golden_rows import keep_row, read_rows
 from tests.viewer.cli.conftest import contents
 from tests.viewer.cli.described_files import described, difference
 from tests.viewer.cli.hard_inputs import write_inputs
 
-GOLDEN = Path(__file__).parents[2] / "golden" / "commands"
 COMMANDS = {
     "screenshot-turned": [
         "screenshot turned.jpg --metric --depth-strength 3 -o a.png --grid 3x5 --view 1.2,-0.8"
@@ -195,9 +195,8 @@ def test_commands_do_and_say_what_they_did(iibr, inputs, tmp_path, monkeypatch, 
         monkeypatch.setenv(variable, "")
     report = "\n".join(report_of(iibr, words) for words in COMMANDS[name]).replace(str(folder), "")
     if regenerate_golden:
-        GOLDEN.mkdir(parents=True, exist_ok=True)
-        (GOLDEN / f"{name}.txt").write_text(report, "utf-8")
-    assert difference(report, (GOLDEN / f"{name}.txt").read_text("utf-8")) is None
+        keep_row("commands", name, report.splitlines())
+    assert difference(report, "\n".join(read_rows("commands")[name])) is None
     assert before.items() <= contents(folder).items(), "inputs stay as they are"
 
 

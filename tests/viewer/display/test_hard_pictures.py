@@ -12,7 +12,7 @@ from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.golden_text import assert_same_text
-from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
+from tests.image_compare import SAME_RASTERISER, assert_golden
 from tests.viewer.display.hard_photo import write_hard_photo
 from viewer.background.maps import SurfaceWork
 from viewer.display.offscreen import OffscreenScene
@@ -93,11 +93,8 @@ def values(viewer, name):
 @pytest.mark.parametrize("name", LOOKS)
 def test_each_way_of_looking_is_the_golden_one(viewer, name, tmp_path, regenerate_golden):
     look(viewer, name)
-    path = GOLDEN / f"{name.replace(', ', '-').replace(' ', '-')}.png"
-    screen = viewer.screen(SIZE)
-    if regenerate_golden:
-        write_png(path, screen)
-    assert_close(screen, read_png(path), SAME_RASTERISER, tmp_path, name)
+    file = f"viewer/{name.replace(', ', '-').replace(' ', '-')}"
+    assert_golden(viewer.screen(SIZE), file, SAME_RASTERISER, tmp_path, regenerate_golden)
     if name in WITH_VALUES:
         lines = list(values(viewer, name))
         assert_same_text(lines, "viewer/values", name, regenerate_golden, atol=0.3, rtol=0.0)

@@ -20,7 +20,7 @@ from iibr_core.method.farthest_views import outer_views_of_grid
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import DISPLAY_P3, GridShape, ViewOffset
-from tests.image_compare import DEPTH_EDGES, assert_close, read_png, write_png
+from tests.image_compare import DEPTH_EDGES, assert_golden
 from tests.viewer.gpu.scenes import TwoPlanes, open_field
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.model.colormap import VIRIDIS
@@ -128,14 +128,9 @@ FIELDS = {
 
 def check(name, pictures, folder, regenerates):
     """Compare pictures of one size with those of a golden sheet, each by itself."""
-    height, width = pictures[0].shape[:2]
     rows = [np.concatenate(pictures[i : i + COLUMNS], axis=1) for i in range(0, len(pictures), COLUMNS)]
-    if regenerates:
-        write_png(GOLDEN / f"{name}.png", np.concatenate(rows))
-    sheet = read_png(GOLDEN / f"{name}.png")
-    for i, picture in enumerate(pictures):
-        top, left = height * (i // COLUMNS), width * (i % COLUMNS)
-        assert_close(picture, sheet[top : top + height, left : left + width], DEPTH_EDGES, folder, f"{name}-{i}")
+    tile = pictures[0].shape[:2]
+    assert_golden(np.concatenate(rows), f"optics/{name}", DEPTH_EDGES, folder, regenerates, tile)
 
 
 @pytest.mark.parametrize("name", FIELDS)

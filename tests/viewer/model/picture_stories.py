@@ -1,4 +1,4 @@
-"""What a person does to the open picture, one action after the other: lens, depth, motions, inspection.
+"""Actions of a person on the open picture, one after the other: lens, depth, motions, inspection.
 
 The photo is hard: an even number of rows, fewer than columns, half as far apart; depth that does not begin at 0; views
 smaller than the photo; a focal length and metric depth.

@@ -1,4 +1,4 @@
-"""What becomes of the state as photos are opened, step by step: reading, folders, depth models, files, the window."""
+"""Actions that open photos, step by step: reading, folders, depth models, files, the window."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What holds for any numbers: clamps, undo and redo, loops, the tilted plane, and optics carried to another plan."""
+"""Laws for any numbers: clamps, undo and redo, loops, the tilted plane, and optics carried to another plan."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Where things lie in windows of several sizes, with and without panel, strips, filmstrip and zoom."""
+"""Places of things in windows of several sizes, with and without panel, strips, filmstrip and zoom."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What people do, one action after the other, and what each action changes: golden texts, read by a person.
+"""Stories of what people do: golden texts tell what each action changes, to be read by a person.
 
 Each line of a golden text is a field that an action changed, or ("=") what another part of the program derives of it.
 """

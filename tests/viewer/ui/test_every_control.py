@@ -29,7 +29,7 @@ NINE = GridShape(9, 9)
 PLAN = replace(plan_of(NINE), reasons=("A reason.",))
 SCENE = scene_of(NINE, plan=PLAN, focal_px=50.0)
 SHARE = 0.3
-"""Where sliders are dragged to, as a share of their length."""
+"""Place to which sliders are dragged, as a share of their length."""
 GIVEN = {"input_text_with_hint": "b", "input_int": 7, "input_float": 1.5, "color_edit3": (0.5, 0.25, 0.125)}
 LEVEL = do(depth.set_brush, Brush("level", is_on=True, sample=DepthSample((0.5, 0.5), 1.0)))
 IN_PIXELS = (

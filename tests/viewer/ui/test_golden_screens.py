@@ -18,7 +18,7 @@ from iibr_core.gloss.settings import GlossSurface
 from iibr_core.scenes.scene import Progress, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
-from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
+from tests.image_compare import SAME_RASTERISER, assert_golden
 from tests.viewer.conftest import headless_with_scene
 from viewer.model import depth, inspection, lens, messages, preferences, selection, stereo, tracking, viewpoint
 from viewer.model.action import do
@@ -165,8 +165,5 @@ def test_screens_are_the_golden_ones(viewer, name, tmp_path, regenerate_golden):
     usual = {"source": SOURCE, "scene": scene, "progress": replace(viewer.state.progress, seconds=1.0)}
     shown = {"preferences": replace(viewer.state.preferences, shows_filmstrip=True), "hides_panel": size != TALL}
     viewer.state = replace(viewer.state, **(usual | shown | changes))
-    image = viewer.screen(size)
-    file = GOLDEN / f"{name.replace(' ', '-')}.png"
-    if regenerate_golden:
-        write_png(file, image)
-    assert_close(image, read_png(file), SAME_RASTERISER, tmp_path, name)
+    file = f"screens/{name.replace(' ', '-')}"
+    assert_golden(viewer.screen(size), file, SAME_RASTERISER, tmp_path, regenerate_golden)
